@@ -1,0 +1,1 @@
+"""The contract's scene document and the sample scenes that ship with the package."""

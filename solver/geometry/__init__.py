@@ -1,0 +1,1 @@
+"""Polygons, materials, the immutable scene and its flattening into patches."""

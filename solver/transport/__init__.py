@@ -1,0 +1,1 @@
+"""Form factors, the element hierarchy and its links, and the residual-based radiosity solve."""

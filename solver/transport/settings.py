@@ -1,0 +1,29 @@
+"""What a user may set about the solve; everything but `error_tolerance` has a default derived from it.
+
+These are parameters 1, 2 and 7 of [H appendix A]; parameter 3 (roundoff) is `solver.tolerances`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """Parameters of one radiosity solve."""
+
+    error_tolerance: float = 0.02
+    """Relative error that the solve aims at: area-weighted RMS luminance error of the element
+    radiosities over their RMS luminance."""
+    transport_error: float | None = None
+    """[H A.1] Largest irradiance error in W/m2 (luminance) that one link may carry; None: derived
+    from `error_tolerance` and the light in the scene."""
+    minimum_area: float | None = None
+    """[H A.2] Elements smaller than twice^2 this area in m2 are not subdivided; None: derived."""
+    relative_cutoff: float | None = None
+    """[H A.7] The iteration stops when the unshot radiosity is at most this fraction of the radiosity;
+    None: derived."""
+    max_elements: int = 400_000
+    """Elements (leaves and inner nodes) after which refinement stops with a warning."""
+    max_links: int = 6_000_000
+    """Links after which refinement stops with a warning."""
