@@ -1,0 +1,171 @@
+"""Documents to scenes and back: what relates one field to another is checked here.
+
+Every error is a SceneError whose location is the path of the offending field in the document.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from solver import tolerances
+from solver.document.fields import MAX_COORDINATE, Location
+from solver.document.framing import middle, overview
+from solver.document.models import (
+    CameraDocument,
+    MaterialDocument,
+    MeshDocument,
+    ObjectDocument,
+    SceneDocument,
+    TransformDocument,
+)
+from solver.errors import DuplicateObjectError, SceneError
+from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
+from solver.geometry.transform import Transform
+from solver.types import Vector
+
+DEFAULT_CAMERA: Final = "main"
+_Y: Final = np.array([0.0, 1.0, 0.0])
+_Z: Final = np.array([0.0, 0.0, 1.0])
+
+
+def scene_of(document: SceneDocument) -> Scene:
+    """The scene that `document` describes. Raises SceneError."""
+    objects: dict[str, SceneObject] = {}
+    for index, entry in enumerate(document.objects):
+        where: Location = ("objects", index)
+        if entry.id in objects:
+            raise DuplicateObjectError(entry.id, (*where, "id"))
+        objects[entry.id] = object_of(entry, where)
+    scene = Scene(objects=objects, name=document.name, luminous_efficacy=document.luminous_efficacy)
+    cameras = document.cameras or {DEFAULT_CAMERA: CameraDocument()}
+    seen = {name: camera_of(camera, scene, ("cameras", name)) for name, camera in cameras.items()}
+    return replace(scene, cameras=seen)
+
+
+def object_of(document: ObjectDocument, where: Location = ()) -> SceneObject:
+    """The object that `document`, found at `where`, describes. Raises SceneError."""
+    placed = SceneObject(
+        id=document.id,
+        mesh=mesh_of(document.mesh, (*where, "mesh")),
+        material=material_of(document.material),
+        transform=transform_of(document.transform),
+    )
+    require_in_bounds(placed, (*where, "transform"))
+    return placed
+
+
+def mesh_of(document: MeshDocument, where: Location = ()) -> Mesh:
+    """The mesh that `document` describes. Raises SceneError where a face names a vertex that is not there."""
+    vertices = np.array(document.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = tuple(tuple(face) for face in document.faces)
+    if faces and max(max(face) for face in faces) >= len(vertices):
+        _refuse_index(faces, len(vertices), where)
+    return Mesh(vertices, faces)
+
+
+def _refuse_index(faces: tuple[tuple[int, ...], ...], count: int, where: Location) -> None:
+    at, face = next((at, face) for at, face in enumerate(faces) if max(face) >= count)
+    corner = next(corner for corner, index in enumerate(face) if index >= count)
+    raise SceneError(
+        f"there is no vertex {face[corner]}: the mesh has {count}, numbered from 0",
+        (*where, "faces", at, corner),
+    )
+
+
+def material_of(document: MaterialDocument) -> Material:
+    """The material that `document` describes."""
+    return Material(np.array(document.reflectance), np.array(document.emission), document.two_sided)
+
+
+def transform_of(document: TransformDocument) -> Transform:
+    """The transform that `document` describes."""
+    if document.matrix is not None:
+        return Transform(np.array(document.matrix).reshape(4, 4))
+    return Transform.from_parts(
+        np.array(document.translation), np.array(document.rotation), np.array(document.scale)
+    )
+
+
+def require_in_bounds(placed: SceneObject, where: Location) -> None:
+    """Raise SceneError where the world coordinates of an object leave the range that a document may hold."""
+    if np.abs(placed.world_vertices).max(initial=0.0) > MAX_COORDINATE:
+        raise SceneError(f"the transform takes vertices beyond {MAX_COORDINATE:g} m", where)
+
+
+def camera_of(document: CameraDocument, scene: Scene, where: Location = ()) -> Camera:
+    """The camera that `document` describes, its missing parts chosen to show `scene`. Raises SceneError."""
+    if document.eye is None:
+        eye, target = overview(scene, document.vertical_fov, document.width / document.height)
+    else:
+        eye, target = np.array(document.eye), middle(scene)
+    if document.target is not None:
+        target = np.array(document.target)
+    if np.array_equal(eye, target):
+        raise SceneError("the target is where the eye is", (*where, "target"))
+    return Camera(
+        eye=eye,
+        target=target,
+        up=_up(document, target - eye, where),
+        vertical_fov=document.vertical_fov,
+        width=document.width,
+        height=document.height,
+    )
+
+
+def is_parallel(a: Vector, b: Vector) -> bool:
+    """Whether two vectors (3,) lie along one line, either way, within rounding."""
+    return bool(np.linalg.norm(np.cross(a, b)) <= tolerances.SIDE * np.linalg.norm(a) * np.linalg.norm(b))
+
+
+def _up(document: CameraDocument, forward: Vector, where: Location) -> Vector:
+    if document.up is None:
+        return _Z if not is_parallel(forward, _Z) else _Y
+    up = np.array(document.up)
+    if is_parallel(forward, up):
+        raise SceneError("the camera looks along its up direction", (*where, "up"))
+    return up
+
+
+def document_of(scene: Scene) -> SceneDocument:
+    """The document of `scene`: posted back, it gives an equal scene, to the last bit."""
+    return SceneDocument(
+        name=scene.name,
+        luminous_efficacy=scene.luminous_efficacy,
+        objects=[_object_document(o) for o in scene],
+        cameras={name: _camera_document(camera) for name, camera in scene.cameras.items()},
+    )
+
+
+def _object_document(source: SceneObject) -> ObjectDocument:
+    return ObjectDocument(
+        id=source.id,
+        mesh=MeshDocument(
+            vertices=source.mesh.vertices.tolist(), faces=[list(face) for face in source.mesh.faces]
+        ),
+        material=MaterialDocument(
+            reflectance=source.material.reflectance.tolist(),
+            emission=source.material.emission.tolist(),
+            two_sided=source.material.two_sided,
+        ),
+        transform=_transform_document(source.transform),
+    )
+
+
+def _transform_document(source: Transform) -> TransformDocument:
+    if np.array_equal(source.matrix[:3, :3], np.eye(3)):
+        return TransformDocument(translation=source.matrix[:3, 3].tolist())
+    return TransformDocument(matrix=source.matrix.ravel().tolist())
+
+
+def _camera_document(source: Camera) -> CameraDocument:
+    return CameraDocument(
+        eye=source.eye.tolist(),
+        target=source.target.tolist(),
+        up=source.up.tolist(),
+        vertical_fov=source.vertical_fov,
+        width=source.width,
+        height=source.height,
+    )

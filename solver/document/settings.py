@@ -1,0 +1,55 @@
+"""What a client may set about the solve; `None` means: derived from `error_tolerance` and the scene."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from solver.document.fields import Closed
+from solver.transport.settings import SolverSettings
+
+_DEFAULTS = SolverSettings()
+
+_Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+_Count: TypeAlias = Annotated[int, Field(strict=True, ge=1, lt=2**31)]
+
+
+class SettingsDocument(Closed):
+    """Solver settings. `error_tolerance` is the one to set; the others follow from it unless given."""
+
+    error_tolerance: float = Field(
+        default=_DEFAULTS.error_tolerance,
+        strict=True,
+        allow_inf_nan=False,
+        gt=0.0,
+        le=1.0,
+        description="Relative error that the solve aims at: the area-weighted RMS luminance error of the "
+        "radiosities over their RMS luminance.",
+    )
+    transport_error: Annotated[_Positive, Field(le=1e12)] | None = Field(
+        default=None, description="Largest error of irradiance, W/m2 of luminance, that one link may carry."
+    )
+    minimum_area: Annotated[_Positive, Field(le=1e18)] | None = Field(
+        default=None, description="Elements about this small, m2, are not subdivided."
+    )
+    relative_cutoff: Annotated[_Positive, Field(lt=1.0)] | None = Field(
+        default=None,
+        description="The solve is done when the unshot radiosity is at most this fraction of all.",
+    )
+    max_elements: _Count = Field(
+        default=_DEFAULTS.max_elements, description="Elements after which refinement stops, with a warning."
+    )
+    max_links: _Count = Field(
+        default=_DEFAULTS.max_links, description="Links after which refinement stops, with a warning."
+    )
+
+    def changes_to(self, settings: SolverSettings) -> SolverSettings:
+        """`settings` with the fields that this document gives, and only those."""
+        return replace(settings, **{name: getattr(self, name) for name in self.model_fields_set})
+
+    @classmethod
+    def describing(cls, settings: SolverSettings) -> SettingsDocument:
+        """The document of `settings`, every field given."""
+        return cls(**asdict(settings))
