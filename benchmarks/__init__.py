@@ -1,0 +1,1 @@
+"""Speed against error, measured: `make bench`."""
