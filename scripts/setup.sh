@@ -139,7 +139,7 @@ set_up_python() {
     fi
 
     if ! done_with project pyproject.toml; then
-        run "${pip[@]}" --no-deps --no-build-isolation --editable .
+        run env PYTHONWARNINGS=ignore "${pip[@]}" --no-deps --no-build-isolation --editable .
         mark_done project pyproject.toml
     fi
 
