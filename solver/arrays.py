@@ -1,0 +1,53 @@
+"""Arrays that grow: capacity doubles, the live part is a view."""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+T = TypeVar("T", bound=np.generic)
+
+
+class GrowingArray(Generic[T]):
+    """An array whose first axis grows by appending, at amortised constant cost."""
+
+    def __init__(self, shape: tuple[int, ...], dtype: type[T], capacity: int = 256) -> None:
+        self._data: NDArray[T] = np.zeros((capacity, *shape), dtype=dtype)
+        self._size = 0
+
+    def __len__(self) -> int:
+        return self._size
+
+    @property
+    def live(self) -> NDArray[T]:
+        """The live rows, a view that stays valid until the next growth."""
+        return self._data[: self._size]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held, spare capacity included."""
+        return int(self._data.nbytes)
+
+    def grow(self, count: int) -> NDArray[T]:
+        """Append `count` rows of zeros and return a view of them."""
+        needed = self._size + count
+        if needed > len(self._data):
+            grown = np.zeros((max(needed, 2 * len(self._data)), *self._data.shape[1:]), self._data.dtype)
+            grown[: self._size] = self._data[: self._size]
+            self._data = grown
+        fresh = self._data[self._size : needed]
+        fresh[...] = 0
+        self._size = needed
+        return fresh
+
+    def append(self, rows: NDArray[Any]) -> None:
+        """Append rows."""
+        self.grow(len(rows))[...] = rows
+
+    def keep(self, mask: NDArray[np.bool_]) -> None:
+        """Drop the rows where `mask` is false."""
+        kept = self._data[: self._size][mask]
+        self._data[: len(kept)] = kept
+        self._size = len(kept)

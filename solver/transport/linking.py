@@ -1,0 +1,378 @@
+"""From pairs of elements to evaluated links: exchange area, its deviations, blockers and visibility.
+
+Everything runs in bulk: kernels over ranges of pairs, then one batch of rays for the pairs that have
+blockers. Pairs without blockers cost no ray ("model only what a scene needs").
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver import tolerances
+from solver.geometry.surfaces import Surfaces
+from solver.kernels import kernel
+from solver.parallel import run_chunks
+from solver.transport.elements import ElementTree
+from solver.transport.exchange import exchange_area, heights
+from solver.transport.lambert import point_form_factor
+from solver.transport.links import LinkBatch, ragged_indices
+from solver.transport.oracle import samples_needed
+from solver.types import Corners, FloatArray, Int64Array, IntArray
+from solver.visibility.bvh import Hierarchy, build_hierarchy
+from solver.visibility.fraction import visible_fractions
+from solver.visibility.rays import RayScene
+from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, first_blockers, inherited_blockers
+
+_CHUNK: Final = 256
+_GAUSS: Final = 0.5 - 0.5 / math.sqrt(3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """The light as it stands, which decides how much care a link deserves; luminance, n elements."""
+
+    radiosity: FloatArray
+    """(n,) W/m2"""
+    reflectance: FloatArray
+    """(n,)"""
+    noise_limit: float
+    """squared error times area, (W/m2)^2 m2, that the sampling of one link's visibility may leave"""
+
+
+@dataclass(frozen=True, eq=False)
+class Linker:
+    """What linking needs to know of a scene."""
+
+    surfaces: Surfaces
+    rays: RayScene
+    hierarchy: Hierarchy
+    side_tolerance: float
+    """metres"""
+    exchange_tolerance: float
+    """relative error of an unoccluded exchange area"""
+
+    @staticmethod
+    def of(surfaces: Surfaces, rays: RayScene, exchange_tolerance: float) -> Linker:
+        """The linker of a scene; its hierarchy holds the front patches, which are the blockers."""
+        fronts = np.flatnonzero(surfaces.side == 0).astype(np.int32)
+        return Linker(
+            surfaces,
+            rays,
+            build_hierarchy(surfaces.corners, fronts),
+            tolerances.SIDE * surfaces.size,
+            exchange_tolerance,
+        )
+
+    def facing_pairs(self, start: int, stop: int) -> tuple[IntArray, IntArray]:
+        """Pairs (p, q) of patches, p in [start, stop) and q > p, that have a part in front of each other."""
+        s = self.surfaces
+        counts = np.zeros(stop - start, dtype=np.int64)
+        empty = np.empty(0, dtype=np.int32)
+
+        def count(a: int, b: int) -> None:
+            _facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
+                    counts, False, empty, empty)  # fmt: skip
+
+        run_chunks(count, stop - start, 64)
+        total = int(counts.sum())
+        p, q = np.empty(total, dtype=np.int32), np.empty(total, dtype=np.int32)
+        first = np.cumsum(counts) - counts
+
+        def fill(a: int, b: int) -> None:
+            _facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
+                    first, True, p, q)  # fmt: skip
+
+        run_chunks(fill, stop - start, 64)
+        return p, q
+
+    def link_patches(self, tree: ElementTree, p: IntArray, q: IntArray, light: Light) -> LinkBatch:
+        """Links between patches."""
+        s, h = self.surfaces, self.hierarchy
+        n = len(p)
+        kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        lists: dict[int, list[IntArray]] = {}
+
+        def work(start: int, stop: int) -> None:
+            pieces: list[IntArray] = []
+            at, room = start, 64 * (stop - start) + len(h.order)
+            while at < stop:
+                pool = np.empty(room, dtype=np.int32)
+                used = first_blockers(
+                    p, q, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip, h.first, h.count,
+                    h.order, self.side_tolerance, at, stop, kind, kept, pool,
+                )  # fmt: skip
+                done = stop - at if used >= 0 else -1 - used
+                length = int(kept[at : at + done].sum())
+                pieces.append(pool[:length].copy())
+                at += done
+            lists[start] = pieces
+
+        run_chunks(work, n, _CHUNK)
+        pool = np.concatenate([piece for start in sorted(lists) for piece in lists[start]] or [kept[:0]])
+        return self._evaluate(tree, p, q, kind, kept, pool, np.ones(n, dtype=np.int32), light)
+
+    def link_children(
+        self,
+        tree: ElementTree,
+        p: IntArray,
+        q: IntArray,
+        parent_start: Int64Array,
+        parent_count: IntArray,
+        parent_pool: IntArray,
+        least_samples: IntArray,
+        light: Light,
+    ) -> LinkBatch:
+        """Links between elements whose parents' link has the blockers given."""
+        n = len(p)
+        kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        room = np.cumsum(parent_count, dtype=np.int64) - parent_count
+        loose = np.empty(int(parent_count.sum()), dtype=np.int32)
+        s = self.surfaces
+
+        def work(start: int, stop: int) -> None:
+            _inherit(
+                p, q, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count, s.normal,
+                parent_start, parent_count, parent_pool, self.side_tolerance, start, stop, room, loose, kind,
+                kept,
+            )  # fmt: skip
+
+        run_chunks(work, n, _CHUNK)
+        return self._evaluate(tree, p, q, kind, kept, loose[ragged_indices(room, kept)], least_samples, light)
+
+    def _evaluate(
+        self,
+        tree: ElementTree,
+        p: IntArray,
+        q: IntArray,
+        kind: IntArray,
+        kept: IntArray,
+        pool: IntArray,
+        least_samples: IntArray,
+        light: Light,
+    ) -> LinkBatch:
+        n = len(p)
+        open_exchange, deviation_p, deviation_q = np.zeros(n), np.zeros(n), np.zeros(n)
+
+        def work(start: int, stop: int) -> None:
+            _exchange(
+                p, q, kind, tree.corners, tree.corner_count, tree.area, tree.patch, self.surfaces.normal,
+                self.side_tolerance, self.exchange_tolerance, start, stop, open_exchange, deviation_p,
+                deviation_q,
+            )  # fmt: skip
+
+        run_chunks(work, n, _CHUNK)
+        visibility = np.where(kind == NONE, 0.0, 1.0)
+        samples, noise = np.zeros(n, dtype=np.int32), np.zeros(n)
+        partial = np.flatnonzero((kind == PARTIAL) & (open_exchange > 0.0))
+        needed = np.empty(len(partial), dtype=np.int32)
+        samples_needed(
+            p[partial], q[partial], open_exchange[partial], tree.area, light.reflectance, light.radiosity,
+            light.noise_limit, needed,
+        )  # fmt: skip
+        samples[partial] = np.maximum(needed, least_samples[partial])
+        for count in np.unique(samples[partial]):
+            part = partial[samples[partial] == count]
+            found = visible_fractions(
+                self.rays, p[part], q[part], open_exchange[part], tree.corners, tree.corner_count, tree.area,
+                tree.patch, self.surfaces.normal, int(count),
+            )  # fmt: skip
+            seen = found.visibility
+            visibility[part] = seen
+            noise[part] = found.noise
+            mean_p = open_exchange[part] / tree.area[p[part]]
+            mean_q = open_exchange[part] / tree.area[q[part]]
+            deviation_p[part] = np.sqrt((seen * deviation_p[part]) ** 2 + mean_p**2 * found.spread_p)
+            deviation_q[part] = np.sqrt((seen * deviation_q[part]) ** 2 + mean_q**2 * found.spread_q)
+        alive = (open_exchange > 0.0) | (kind == NONE)
+        ends = np.cumsum(kept, dtype=np.int64)
+        return LinkBatch(
+            p=p[alive],
+            q=q[alive],
+            open_exchange=open_exchange[alive],
+            visibility=visibility[alive],
+            samples=samples[alive],
+            noise=noise[alive],
+            kind=kind[alive],
+            deviation_p=deviation_p[alive],
+            deviation_q=deviation_q[alive],
+            blocker_count=kept[alive],
+            blockers=pool[ragged_indices((ends - kept)[alive], kept[alive])],
+        )
+
+
+@kernel
+def _facing(
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    tolerance: float,
+    base: int,
+    start: int,
+    stop: int,
+    slot: Int64Array,
+    write: bool,
+    out_p: IntArray,
+    out_q: IntArray,
+) -> None:
+    """Count, or write from slot[p - base], the patches q > p that p in [start, stop) faces."""
+    for p in range(start, stop):
+        found = 0
+        for q in range(p + 1, len(corners)):
+            _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
+            if high <= tolerance:
+                continue
+            _, high = heights(corners[p], counts[p], corners[q, 0], normals[q])
+            if high <= tolerance:
+                continue
+            if write:
+                out_p[slot[p - base] + found] = p
+                out_q[slot[p - base] + found] = q
+            found += 1
+        if not write:
+            slot[p - base] = found
+
+
+@kernel
+def _inherit(
+    p: IntArray,
+    q: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    patch: IntArray,
+    patch_corners: Corners,
+    patch_counts: IntArray,
+    normals: FloatArray,
+    parent_start: Int64Array,
+    parent_count: IntArray,
+    parent_pool: IntArray,
+    tolerance: float,
+    start: int,
+    stop: int,
+    room: Int64Array,
+    out: IntArray,
+    kind: IntArray,
+    kept: IntArray,
+) -> None:
+    planes = np.empty((MAX_PLANES, 4))
+    for pair in range(start, stop):
+        if parent_count[pair] == 0:
+            kind[pair] = FULL
+            kept[pair] = 0
+            continue
+        i = p[pair]
+        j = q[pair]
+        kind[pair], kept[pair] = inherited_blockers(
+            corners[i], counts[i], normals[patch[i]], corners[j], counts[j], normals[patch[j]],
+            patch_corners, patch_counts, normals, parent_pool, parent_start[pair], parent_count[pair],
+            tolerance, planes, out, room[pair],
+        )  # fmt: skip
+
+
+@kernel
+def _exchange(
+    p: IntArray,
+    q: IntArray,
+    kind: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    area: FloatArray,
+    patch: IntArray,
+    normals: FloatArray,
+    side_tolerance: float,
+    tolerance: float,
+    start: int,
+    stop: int,
+    exchange: FloatArray,
+    deviation_p: FloatArray,
+    deviation_q: FloatArray,
+) -> None:
+    scratch = np.empty((2, 8, 3))
+    for pair in range(start, stop):
+        if kind[pair] == NONE:
+            continue
+        i = p[pair]
+        j = q[pair]
+        n1 = normals[patch[i]]
+        n2 = normals[patch[j]]
+        exchange[pair] = exchange_area(
+            corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], side_tolerance,
+            tolerance, scratch,
+        )  # fmt: skip
+        if exchange[pair] > 0.0:
+            deviation_p[pair] = _deviation(
+                corners[i], counts[i], n1, corners[j], counts[j], n2, area[j], scratch[0]
+            )
+            deviation_q[pair] = _deviation(
+                corners[j], counts[j], n2, corners[i], counts[i], n1, area[i], scratch[0]
+            )
+
+
+@kernel
+def _deviation(
+    receiver: FloatArray,
+    count: int,
+    normal: FloatArray,
+    source: FloatArray,
+    source_count: int,
+    source_normal: FloatArray,
+    source_area: float,
+    scratch: FloatArray,
+) -> float:
+    """RMS deviation over a receiver of the unoccluded form factor to a source, from 4 (3) Gauss points.
+
+    The points integrate quadratic functions exactly, so that the deviation is that of the form factor's
+    linear part. A distant source is taken as a point.
+    """
+    cx = 0.0
+    cy = 0.0
+    cz = 0.0
+    for k in range(source_count):
+        cx += source[k, 0] / source_count
+        cy += source[k, 1] / source_count
+        cz += source[k, 2] / source_count
+    sx = source[0, 0] - cx
+    sy = source[0, 1] - cy
+    sz = source[0, 2] - cz
+    radius2 = sx * sx + sy * sy + sz * sz
+    total = 0.0
+    square_total = 0.0
+    for k in range(count):
+        # Each point is a blend of a corner and the centre of the receiver.
+        if count == 4:
+            m = (k + 1) % 4
+            o = (k + 2) % 4
+            n = (k + 3) % 4
+            wk = (1.0 - _GAUSS) * (1.0 - _GAUSS)
+            ws = _GAUSS * (1.0 - _GAUSS)
+            wo = _GAUSS * _GAUSS
+            x = wk * receiver[k, 0] + ws * (receiver[m, 0] + receiver[n, 0]) + wo * receiver[o, 0]
+            y = wk * receiver[k, 1] + ws * (receiver[m, 1] + receiver[n, 1]) + wo * receiver[o, 1]
+            z = wk * receiver[k, 2] + ws * (receiver[m, 2] + receiver[n, 2]) + wo * receiver[o, 2]
+        else:
+            m = (k + 1) % 3
+            o = (k + 2) % 3
+            x = (4.0 * receiver[k, 0] + receiver[m, 0] + receiver[o, 0]) / 6.0
+            y = (4.0 * receiver[k, 1] + receiver[m, 1] + receiver[o, 1]) / 6.0
+            z = (4.0 * receiver[k, 2] + receiver[m, 2] + receiver[o, 2]) / 6.0
+        dx = cx - x
+        dy = cy - y
+        dz = cz - z
+        square = dx * dx + dy * dy + dz * dz
+        value = 0.0
+        if square > 9.0 * radius2:
+            cosine1 = dx * normal[0] + dy * normal[1] + dz * normal[2]
+            cosine2 = -(dx * source_normal[0] + dy * source_normal[1] + dz * source_normal[2])
+            if cosine1 > 0.0 and cosine2 > 0.0:
+                value = cosine1 * cosine2 * source_area / (math.pi * square * square)
+        else:
+            value = point_form_factor(
+                x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch
+            )
+        total += value
+        square_total += value * value
+    mean = total / count
+    return math.sqrt(max(0.0, square_total / count - mean * mean))

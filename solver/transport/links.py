@@ -1,0 +1,179 @@
+"""Links: who exchanges light with whom at which level of the hierarchy, as one table ([H 4.1]).
+
+A link is symmetric; for any two mutually visible points there is exactly one link between an element
+that holds the one and an element that holds the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.arrays import GrowingArray
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class LinkBatch:
+    """Evaluated links about to enter the table, n rows."""
+
+    p: IntArray
+    """(n,) element at one end"""
+    q: IntArray
+    """(n,) element at the other"""
+    open_exchange: FloatArray
+    """(n,) m2, as if nothing stood between"""
+    visibility: FloatArray
+    """(n,) visible fraction"""
+    samples: IntArray
+    """(n,) rays behind `visibility`, in units of 16; 0 where it is exact"""
+    noise: FloatArray
+    """(n,) expected squared error of `visibility` from sampling"""
+    kind: IntArray
+    """(n,) FULL, PARTIAL or NONE of `visibility.shafts`"""
+    deviation_p: FloatArray
+    """(n,) RMS deviation over p of the form factor from its points to q"""
+    deviation_q: FloatArray
+    """(n,) the same over q"""
+    blocker_count: IntArray
+    """(n,) length of each blocker list"""
+    blockers: IntArray
+    """all lists, one after the other: patches"""
+
+
+class LinkTable:
+    """Struct of growing arrays over the links; the columns are those of `LinkBatch`."""
+
+    def __init__(self) -> None:
+        self._p = GrowingArray((), np.int32, 4096)
+        self._q = GrowingArray((), np.int32, 4096)
+        self._open = GrowingArray((), np.float64, 4096)
+        self._visibility = GrowingArray((), np.float64, 4096)
+        self._samples = GrowingArray((), np.int32, 4096)
+        self._noise = GrowingArray((), np.float64, 4096)
+        self._kind = GrowingArray((), np.int32, 4096)
+        self._deviation_p = GrowingArray((), np.float64, 4096)
+        self._deviation_q = GrowingArray((), np.float64, 4096)
+        self._blocker_start = GrowingArray((), np.int64, 4096)
+        self._blocker_count = GrowingArray((), np.int32, 4096)
+        self._pool = GrowingArray((), np.int32, 4096)
+
+    def __len__(self) -> int:
+        return len(self._p)
+
+    @property
+    def p(self) -> IntArray:
+        """(n,) element at one end"""
+        return self._p.live
+
+    @property
+    def q(self) -> IntArray:
+        """(n,) element at the other end"""
+        return self._q.live
+
+    @property
+    def open_exchange(self) -> FloatArray:
+        """(n,) m2 without occlusion"""
+        return self._open.live
+
+    @property
+    def visibility(self) -> FloatArray:
+        """(n,) visible fraction"""
+        return self._visibility.live
+
+    @property
+    def samples(self) -> IntArray:
+        """(n,) rays behind the visible fraction, in units of 16; 0 where it is exact"""
+        return self._samples.live
+
+    @property
+    def noise(self) -> FloatArray:
+        """(n,) expected squared error of the visible fraction from sampling"""
+        return self._noise.live
+
+    @property
+    def kind(self) -> IntArray:
+        """(n,) visibility class"""
+        return self._kind.live
+
+    @property
+    def deviation_p(self) -> FloatArray:
+        """(n,) RMS deviation over p of the form factor to q"""
+        return self._deviation_p.live
+
+    @property
+    def deviation_q(self) -> FloatArray:
+        """(n,) RMS deviation over q of the form factor to p"""
+        return self._deviation_q.live
+
+    @property
+    def blocker_start(self) -> Int64Array:
+        """(n,) where a link's blockers begin in `pool`"""
+        return self._blocker_start.live
+
+    @property
+    def blocker_count(self) -> IntArray:
+        """(n,) how many there are"""
+        return self._blocker_count.live
+
+    @property
+    def pool(self) -> IntArray:
+        """All blocker lists: patches"""
+        return self._pool.live
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held."""
+        return sum(column.nbytes for column in (*self._columns(), self._pool))
+
+    def append(self, batch: LinkBatch) -> None:
+        """Take evaluated links in."""
+        start = len(self._pool) + np.cumsum(batch.blocker_count, dtype=np.int64) - batch.blocker_count
+        self._p.append(batch.p)
+        self._q.append(batch.q)
+        self._open.append(batch.open_exchange)
+        self._visibility.append(batch.visibility)
+        self._samples.append(batch.samples)
+        self._noise.append(batch.noise)
+        self._kind.append(batch.kind)
+        self._deviation_p.append(batch.deviation_p)
+        self._deviation_q.append(batch.deviation_q)
+        self._blocker_start.append(start)
+        self._blocker_count.append(batch.blocker_count)
+        self._pool.append(batch.blockers)
+
+    def remove(self, gone: BoolArray) -> None:
+        """Drop the links where `gone` (n,) is true; blocker lists are compacted once half are stale."""
+        keep = ~gone
+        for column in self._columns():
+            column.keep(keep)
+        used = int(self.blocker_count.sum())
+        if len(self._pool) > 2 * used + 4096:
+            index = ragged_indices(self.blocker_start, self.blocker_count)
+            compact = self.pool[index]
+            self._pool = GrowingArray((), np.int32, max(4096, used))
+            self._pool.append(compact)
+            self.blocker_start[...] = np.cumsum(self.blocker_count, dtype=np.int64) - self.blocker_count
+
+    def _columns(self) -> tuple[GrowingArray[np.generic], ...]:
+        return (  # type: ignore[return-value]
+            self._p,
+            self._q,
+            self._open,
+            self._visibility,
+            self._samples,
+            self._noise,
+            self._kind,
+            self._deviation_p,
+            self._deviation_q,
+            self._blocker_start,
+            self._blocker_count,
+        )
+
+
+def ragged_indices(start: Int64Array, count: IntArray) -> Int64Array:
+    """Concatenation of the ranges [start, start + count), (sum(count),)."""
+    total = int(count.sum())
+    ends = np.cumsum(count, dtype=np.int64)
+    return np.arange(total, dtype=np.int64) + np.repeat(start - (ends - count), count)

@@ -1,0 +1,337 @@
+"""Shafts: which polygons can stand between two elements ([H 4.1], without its test of all triples).
+
+The shaft of a pair is the convex hull of its two polygons. It is bounded by their two planes and by the
+planes through an edge of one and a vertex of the other that have both polygons on one side. A polygon
+outside any of these planes, or with both elements on one side of its own plane, cannot block. What
+remains are the pair's blockers: none means full visibility, exactly. Children of a link inherit its
+blockers and test only those; the first lists come from a walk of the bounding volume hierarchy.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from solver.kernels import kernel
+from solver.types import Corners, FloatArray, IntArray
+
+MAX_PLANES: Final = 20
+"""Two polygon planes, and at most one supporting plane on either side of each of eight edges."""
+
+FULL: Final = 0
+PARTIAL: Final = 1
+NONE: Final = 2
+"""Visibility classes of a link."""
+
+
+@kernel
+def shaft_planes(
+    first: FloatArray,
+    n1: int,
+    normal1: FloatArray,
+    second: FloatArray,
+    n2: int,
+    normal2: FloatArray,
+    planes: FloatArray,
+) -> int:
+    """Bounding planes (a, b, c, d) of the hull of two polygons (4, 3), inside where ax + by + cz >= d.
+
+    planes (MAX_PLANES, 4) is filled; returns how many there are. Normals are of unit length.
+    """
+    count = 0
+    for which in range(2):
+        polygon = first if which == 0 else second
+        normal = normal1 if which == 0 else normal2
+        for axis in range(3):
+            planes[count, axis] = normal[axis]
+        planes[count, 3] = (
+            normal[0] * polygon[0, 0] + normal[1] * polygon[0, 1] + normal[2] * polygon[0, 2]
+        )
+        count += 1
+    for which in range(2):
+        a = first if which == 0 else second
+        na = n1 if which == 0 else n2
+        b = second if which == 0 else first
+        nb = n2 if which == 0 else n1
+        for k in range(na):
+            m = (k + 1) % na
+            ex = a[m, 0] - a[k, 0]
+            ey = a[m, 1] - a[k, 1]
+            ez = a[m, 2] - a[k, 2]
+            edge = np.sqrt(ex * ex + ey * ey + ez * ez)
+            for v in range(nb):
+                rx = b[v, 0] - a[k, 0]
+                ry = b[v, 1] - a[k, 1]
+                rz = b[v, 2] - a[k, 2]
+                px = ey * rz - ez * ry
+                py = ez * rx - ex * rz
+                pz = ex * ry - ey * rx
+                length = np.sqrt(px * px + py * py + pz * pz)
+                reach = np.sqrt(rx * rx + ry * ry + rz * rz)
+                if length <= 1e-7 * edge * reach:
+                    continue
+                px /= length
+                py /= length
+                pz /= length
+                d = px * a[k, 0] + py * a[k, 1] + pz * a[k, 2]
+                slack = 1e-9 * (edge + reach)
+                low = 0.0
+                high = 0.0
+                for j in range(na):
+                    h = px * a[j, 0] + py * a[j, 1] + pz * a[j, 2] - d
+                    low = min(low, h)
+                    high = max(high, h)
+                if low < -slack and high > slack:
+                    break
+                for j in range(nb):
+                    h = px * b[j, 0] + py * b[j, 1] + pz * b[j, 2] - d
+                    low = min(low, h)
+                    high = max(high, h)
+                    if low < -slack and high > slack:
+                        break
+                if count < MAX_PLANES and not (low < -slack and high > slack):
+                    sign = 1.0 if high > -low else -1.0
+                    planes[count, 0] = sign * px
+                    planes[count, 1] = sign * py
+                    planes[count, 2] = sign * pz
+                    planes[count, 3] = sign * d
+                    count += 1
+                    break
+    return count
+
+
+@kernel
+def can_block(
+    blocker: FloatArray,
+    n: int,
+    normal: FloatArray,
+    first: FloatArray,
+    n1: int,
+    second: FloatArray,
+    n2: int,
+    planes: FloatArray,
+    plane_count: int,
+    tolerance: float,
+) -> bool:
+    """Whether a convex polygon (4, 3) reaches into the shaft and has the elements on both its sides."""
+    for p in range(plane_count):
+        outside = True
+        for k in range(n):
+            height = (
+                planes[p, 0] * blocker[k, 0] + planes[p, 1] * blocker[k, 1] + planes[p, 2] * blocker[k, 2]
+            )
+            if height - planes[p, 3] > tolerance:
+                outside = False
+                break
+        if outside:
+            return False
+    offset = normal[0] * blocker[0, 0] + normal[1] * blocker[0, 1] + normal[2] * blocker[0, 2]
+    above = False
+    below = False
+    for k in range(n1):
+        height = normal[0] * first[k, 0] + normal[1] * first[k, 1] + normal[2] * first[k, 2] - offset
+        above = above or height > tolerance
+        below = below or height < -tolerance
+    for k in range(n2):
+        height = normal[0] * second[k, 0] + normal[1] * second[k, 1] + normal[2] * second[k, 2] - offset
+        above = above or height > tolerance
+        below = below or height < -tolerance
+    return above and below
+
+
+@kernel
+def covers(
+    blocker: FloatArray,
+    n: int,
+    normal: FloatArray,
+    first: FloatArray,
+    n1: int,
+    second: FloatArray,
+    n2: int,
+    tolerance: float,
+) -> bool:
+    """Whether one convex polygon (4, 3) hides the elements from each other entirely.
+
+    True if the elements lie on different sides of its plane and every segment between their vertices
+    passes through it: where those segments meet the plane, their hull holds all others.
+    """
+    offset = normal[0] * blocker[0, 0] + normal[1] * blocker[0, 1] + normal[2] * blocker[0, 2]
+    for i in range(n1):
+        a = normal[0] * first[i, 0] + normal[1] * first[i, 1] + normal[2] * first[i, 2] - offset
+        if abs(a) <= tolerance:
+            return False
+        for j in range(n2):
+            b = normal[0] * second[j, 0] + normal[1] * second[j, 1] + normal[2] * second[j, 2] - offset
+            if abs(b) <= tolerance or (a > 0.0) == (b > 0.0):
+                return False
+            t = a / (a - b)
+            x = first[i, 0] + t * (second[j, 0] - first[i, 0])
+            y = first[i, 1] + t * (second[j, 1] - first[i, 1])
+            z = first[i, 2] + t * (second[j, 2] - first[i, 2])
+            for k in range(n):
+                m = (k + 1) % n
+                ex = blocker[m, 0] - blocker[k, 0]
+                ey = blocker[m, 1] - blocker[k, 1]
+                ez = blocker[m, 2] - blocker[k, 2]
+                rx = x - blocker[k, 0]
+                ry = y - blocker[k, 1]
+                rz = z - blocker[k, 2]
+                side = (
+                    (ey * rz - ez * ry) * normal[0]
+                    + (ez * rx - ex * rz) * normal[1]
+                    + (ex * ry - ey * rx) * normal[2]
+                )
+                if side < 0.0:
+                    return False
+    return True
+
+
+@kernel
+def walk_hierarchy(
+    low: FloatArray,
+    high: FloatArray,
+    skip: IntArray,
+    leaf_first: IntArray,
+    leaf_count: IntArray,
+    order: IntArray,
+    planes: FloatArray,
+    plane_count: int,
+    tolerance: float,
+    out: IntArray,
+) -> int:
+    """Polygons in leaves whose box reaches into the shaft, into `out`; returns their number."""
+    found = 0
+    node = 0
+    while node < len(skip):
+        missed = False
+        for p in range(plane_count):
+            # The box corner furthest along the plane's normal decides.
+            reach = 0.0
+            for axis in range(3):
+                c = planes[p, axis]
+                reach += c * (high[node, axis] if c > 0.0 else low[node, axis])
+            if reach - planes[p, 3] <= tolerance:
+                missed = True
+                break
+        if missed:
+            node = skip[node]
+            continue
+        if leaf_first[node] >= 0:
+            for k in range(leaf_first[node], leaf_first[node] + leaf_count[node]):
+                out[found] = order[k]
+                found += 1
+        node += 1
+    return found
+
+
+@kernel
+def first_blockers(
+    pair_p: IntArray,
+    pair_q: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    skip: IntArray,
+    leaf_first: IntArray,
+    leaf_count: IntArray,
+    order: IntArray,
+    tolerance: float,
+    start: int,
+    stop: int,
+    visibility: IntArray,
+    blocker_count: IntArray,
+    pool: IntArray,
+) -> int:
+    """Blockers of top-level pairs [start, stop) of patches, appended to `pool`; returns the pool's use.
+
+    Writes visibility (FULL, PARTIAL, NONE) and blocker_count per pair. If the pool is too small the
+    return value is -1 - (pairs done): call again from there with a fresh pool.
+    """
+    planes = np.empty((MAX_PLANES, 4))
+    candidates = np.empty(len(order), dtype=np.int32)
+    used = 0
+    for pair in range(start, stop):
+        p = pair_p[pair]
+        q = pair_q[pair]
+        plane_count = shaft_planes(
+            corners[p], counts[p], normals[p], corners[q], counts[q], normals[q], planes
+        )
+        found = walk_hierarchy(
+            low, high, skip, leaf_first, leaf_count, order, planes, plane_count, tolerance, candidates
+        )
+        if used + found > len(pool):
+            return -1 - (pair - start)
+        kept = 0
+        hidden = False
+        for k in range(found):
+            b = candidates[k]
+            if b == p or b == q:
+                continue
+            if not can_block(
+                corners[b],
+                counts[b],
+                normals[b],
+                corners[p],
+                counts[p],
+                corners[q],
+                counts[q],
+                planes,
+                plane_count,
+                tolerance,
+            ):
+                continue
+            pool[used + kept] = b
+            kept += 1
+            if not hidden and covers(
+                corners[b], counts[b], normals[b], corners[p], counts[p], corners[q], counts[q], tolerance
+            ):
+                hidden = True
+                pool[used] = b
+                kept = 1
+                break
+        visibility[pair] = NONE if hidden else (FULL if kept == 0 else PARTIAL)
+        blocker_count[pair] = kept
+        used += kept
+    return used
+
+
+@kernel
+def inherited_blockers(
+    first: FloatArray,
+    n1: int,
+    normal1: FloatArray,
+    second: FloatArray,
+    n2: int,
+    normal2: FloatArray,
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    parents: IntArray,
+    parent_start: int,
+    parent_count: int,
+    tolerance: float,
+    planes: FloatArray,
+    out: IntArray,
+    used: int,
+) -> tuple[int, int]:
+    """Which of the parent link's blockers still block a child pair: (visibility, number kept).
+
+    The kept ones are written to out[used:]; corners, counts, normals are those of the patches.
+    """
+    plane_count = shaft_planes(first, n1, normal1, second, n2, normal2, planes)
+    kept = 0
+    for k in range(parent_start, parent_start + parent_count):
+        b = parents[k]
+        if not can_block(
+            corners[b], counts[b], normals[b], first, n1, second, n2, planes, plane_count, tolerance
+        ):
+            continue
+        if covers(corners[b], counts[b], normals[b], first, n1, second, n2, tolerance):
+            out[used] = b
+            return NONE, 1
+        out[used + kept] = b
+        kept += 1
+    return (FULL if kept == 0 else PARTIAL), kept
