@@ -5,6 +5,7 @@ Every error is a SceneError whose location is the path of the offending field in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -103,30 +104,33 @@ def camera_of(document: CameraDocument, scene: Scene, where: Location = ()) -> C
         eye, target = np.array(document.eye), middle(scene)
     if document.target is not None:
         target = np.array(document.target)
-    if np.array_equal(eye, target):
-        raise SceneError("the target is where the eye is", (*where, "target"))
     return Camera(
         eye=eye,
         target=target,
-        up=_up(document, target - eye, where),
+        up=up_of(eye, target, document.up, where),
         vertical_fov=document.vertical_fov,
         width=document.width,
         height=document.height,
     )
 
 
+def up_of(eye: Vector, target: Vector, up: Sequence[float] | None, where: Location = ()) -> Vector:
+    """(3,) up direction of a camera at `eye` that looks at `target`: `up`, or by default z or y.
+
+    Raises SceneError where there is no direction to look in, or it is along `up`.
+    """
+    if np.array_equal(eye, target):
+        raise SceneError("the target is where the eye is", (*where, "target"))
+    if up is None:
+        return _Z if not is_parallel(target - eye, _Z) else _Y
+    if is_parallel(target - eye, np.array(up)):
+        raise SceneError("the camera looks along its up direction", (*where, "up"))
+    return np.array(up)
+
+
 def is_parallel(a: Vector, b: Vector) -> bool:
     """Whether two vectors (3,) lie along one line, either way, within rounding."""
     return bool(np.linalg.norm(np.cross(a, b)) <= tolerances.SIDE * np.linalg.norm(a) * np.linalg.norm(b))
-
-
-def _up(document: CameraDocument, forward: Vector, where: Location) -> Vector:
-    if document.up is None:
-        return _Z if not is_parallel(forward, _Z) else _Y
-    up = np.array(document.up)
-    if is_parallel(forward, up):
-        raise SceneError("the camera looks along its up direction", (*where, "up"))
-    return up
 
 
 def document_of(scene: Scene) -> SceneDocument:

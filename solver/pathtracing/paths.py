@@ -1,0 +1,68 @@
+"""The paths in flight and the shadow rays they cast, as structs of arrays of fixed capacity."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.types import FloatArray, IntArray
+
+
+class Paths(NamedTuple):
+    """Rays about to be traced; the first `alive` rows are in use."""
+
+    origin: FloatArray
+    """(w, 3) metres, off the surface that the ray leaves"""
+    direction: FloatArray
+    """(w, 3) unit"""
+    cosine: FloatArray
+    """(w,) to the normal at the origin; negative for a ray that leaves the camera"""
+    throughput: FloatArray
+    """(w, 3) what one W/m2 of radiosity at the next vertex adds to the estimate"""
+    item: IntArray
+    """(w,) row of the task's sums that the path adds to"""
+    vertex: IntArray
+    """(w,) number of the next vertex, 0 for the first that reflects"""
+    stream: NDArray[np.uint64]
+    """(w,)"""
+    index: NDArray[np.uint64]
+    """(w,) index of the sample in its stream"""
+
+
+class ShadowRays(NamedTuple):
+    """Light that arrives unless its segment is blocked."""
+
+    origin: FloatArray
+    """(s, 3) metres"""
+    target: FloatArray
+    """(s, 3) metres"""
+    energy: FloatArray
+    """(s, 3)"""
+    item: IntArray
+    """(s,) row of the task's sums"""
+
+
+def allocate_paths(capacity: int) -> Paths:
+    """Room for `capacity` paths."""
+    return Paths(
+        origin=np.empty((capacity, 3)),
+        direction=np.empty((capacity, 3)),
+        cosine=np.empty(capacity),
+        throughput=np.empty((capacity, 3)),
+        item=np.empty(capacity, dtype=np.int32),
+        vertex=np.empty(capacity, dtype=np.int32),
+        stream=np.empty(capacity, dtype=np.uint64),
+        index=np.empty(capacity, dtype=np.uint64),
+    )
+
+
+def allocate_shadow_rays(capacity: int) -> ShadowRays:
+    """Room for `capacity` shadow rays."""
+    return ShadowRays(
+        origin=np.empty((capacity, 3)),
+        target=np.empty((capacity, 3)),
+        energy=np.empty((capacity, 3)),
+        item=np.empty(capacity, dtype=np.int32),
+    )
