@@ -1,0 +1,1 @@
+"""The HTTP service: routes, wire schemas and session hosting. It translates, and decides nothing about light."""

@@ -1,0 +1,62 @@
+"""The application: routes, errors, limits and the life of the workers behind them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import Depends, FastAPI
+from starlette.middleware import Middleware
+
+from service import problems
+from service.config import ServiceSettings
+from service.context import Context, require_token
+from service.hosting.pool import WorkerPool
+from service.hosting.sessions import Sessions
+from service.json_body import BodyLimit
+from service.metrics import Metrics, RequestMetrics
+from service.openapi import describe, version
+from service.routes import edits, events, frames, later, pages, probe, scenes
+from service.routes import sessions as session_routes
+
+
+def create_app(settings: ServiceSettings | None = None) -> FastAPI:
+    """A new application. Its workers start and end with its lifespan."""
+    chosen = settings or ServiceSettings()
+    metrics = Metrics()
+    pool = WorkerPool(chosen.pool_size, chosen.refill_delay, metrics.workers_lost.inc)
+    sessions = Sessions(pool, chosen.max_sessions, chosen.idle_seconds)
+    metrics.sessions.set_function(lambda: len(sessions))
+    metrics.warm_workers.set_function(lambda: pool.stock)
+    app = FastAPI(
+        title="halflight",
+        version=version(),
+        lifespan=_life,
+        middleware=[
+            Middleware(RequestMetrics, metrics=metrics),
+            Middleware(BodyLimit, max_bytes=chosen.max_body_bytes),
+        ],
+        redoc_url=None,
+    )
+    app.state.context = Context(chosen, pool, sessions, metrics)
+    problems.install(app)
+    app.include_router(pages.router)
+    for routes in (scenes, session_routes, edits, frames, probe, events, later):
+        app.include_router(routes.router, prefix="/v1", dependencies=[Depends(require_token)])
+    describe(app)
+    return app
+
+
+@asynccontextmanager
+async def _life(app: FastAPI) -> AsyncIterator[None]:
+    context: Context = app.state.context
+    await context.pool.fill()
+    expiring = asyncio.create_task(context.sessions.expire_forever())
+    try:
+        yield
+    finally:
+        expiring.cancel()
+        await asyncio.gather(expiring, return_exceptions=True)
+        await context.sessions.close()
+        await context.pool.close()

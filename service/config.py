@@ -1,0 +1,80 @@
+"""The service's settings, from the environment: `HALFLIGHT_<NAME>`, and `HOST` and `PORT`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, TypeAlias
+
+from pydantic import AliasChoices, Field, SecretStr
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from solver.document.limits import SceneLimits
+from solver.errors import LimitExceededError
+from solver.transport.settings import SolverSettings
+
+_Count: TypeAlias = Annotated[int, Field(ge=1)]
+
+
+class ServiceSettings(BaseSettings):
+    """How the service runs, and what it puts up with."""
+
+    model_config = SettingsConfigDict(env_prefix="HALFLIGHT_", frozen=True)
+
+    host: str = Field(
+        default="127.0.0.1",
+        min_length=1,
+        validation_alias=AliasChoices("HALFLIGHT_HOST", "HOST", "host"),
+        description="Address to listen on. Only this machine reaches the default.",
+    )
+    port: int = Field(
+        default=8000,
+        ge=0,
+        le=65535,
+        validation_alias=AliasChoices("HALFLIGHT_PORT", "PORT", "port"),
+        description="Port to listen on; 0 takes a free one.",
+    )
+    token: SecretStr | None = Field(
+        default=None, min_length=1, description="Where given, /v1 and /metrics ask for it as a bearer token."
+    )
+    pool_size: int = Field(default=1, ge=0, le=64, description="Workers kept warm for the next sessions.")
+    refill_delay: float = Field(
+        default=1.0, ge=0.0, description="Seconds that a new session has the cores to itself before the pool refills."
+    )
+    idle_seconds: float = Field(
+        default=1800.0, gt=0.0, description="A session that nobody has used for this long is ended."
+    )
+    max_sessions: _Count = Field(default=16, description="Sessions at once.")
+    max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
+    max_polygons: _Count = Field(default=20_000, description="Faces of a scene.")
+    max_vertices: _Count = Field(default=200_000, description="Vertices, or corners of faces, of a scene.")
+    max_elements: _Count = Field(default=2_000_000, description="Largest `max_elements` that a client may set.")
+    max_links: _Count = Field(default=30_000_000, description="Largest `max_links` that a client may set.")
+    max_frame_width: _Count = Field(default=4096, description="Pixels across a frame.")
+    max_frame_height: _Count = Field(default=4096, description="Pixels down a frame.")
+    max_frame_pixels: _Count = Field(default=2**23, description="Pixels of a frame.")
+    max_samples: _Count = Field(default=64, description="Samples of a pixel.")
+    max_probe_points: _Count = Field(default=10_000, description="Points of a probe.")
+    max_edits: _Count = Field(default=1000, description="Edits in a batch.")
+    max_wait_ms: _Count = Field(default=600_000, description="Longest wait for a frame, whatever is asked.")
+
+    @property
+    def scene_limits(self) -> SceneLimits:
+        """The largest scene."""
+        return SceneLimits(self.max_polygons, self.max_vertices)
+
+    @property
+    def solver_defaults(self) -> SolverSettings:
+        """Solver settings of a session that gives none, within the limits."""
+        defaults = SolverSettings()
+        return replace(
+            defaults,
+            max_elements=min(defaults.max_elements, self.max_elements),
+            max_links=min(defaults.max_links, self.max_links),
+        )
+
+    def check_solver(self, settings: SolverSettings) -> None:
+        """Raise LimitExceededError where a client's solver settings ask for too much."""
+        if settings.max_elements > self.max_elements:
+            raise LimitExceededError("max_elements", settings.max_elements, self.max_elements)
+        if settings.max_links > self.max_links:
+            raise LimitExceededError("max_links", settings.max_links, self.max_links)

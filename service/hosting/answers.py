@@ -1,0 +1,88 @@
+"""What a worker answers: requests put to the engine, and the engine's errors as refusals."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Final
+
+from service.hosting.messages import (
+    ApplyEdits,
+    Configure,
+    EditsAnswer,
+    FrameAnswer,
+    GetFrame,
+    GetScene,
+    GetStatus,
+    Probe,
+    Refusal,
+    RefusalKind,
+    Request,
+    SceneAnswer,
+)
+from solver.engine.engine import Engine
+from solver.engine.requests import NotAvailableError
+from solver.engine.views import Outlook
+from solver.errors import (
+    LimitExceededError,
+    RenderingUnavailableError,
+    RevisionConflictError,
+    SceneError,
+    SolverError,
+)
+
+REFUSED: Final = (SolverError, MemoryError)
+"""What an engine raises on purpose, having changed nothing."""
+
+
+def answer(engine: Engine, request: Request[object]) -> object:
+    """Put a request to the engine. Raises one of REFUSED."""
+    match request:
+        case GetStatus():
+            return engine.status()
+        case GetScene():
+            return SceneAnswer(engine.revision, engine.scene)
+        case Configure(changes):
+            engine.configure(changes.changes_to(engine.settings))
+            return engine.status()
+        case ApplyEdits(edits, if_revision):
+            changes = engine.apply(edits, if_revision)
+            return EditsAnswer(engine.revision, changes)
+        case Probe(positions, normals):
+            return engine.probe(positions, normals)
+        case _:
+            raise TypeError(f"no answer to {type(request).__name__}")
+
+
+def answer_frame(engine: Engine, request: GetFrame) -> FrameAnswer:
+    """The frame as well as it can be drawn now; not drawn if the client has it. Raises one of REFUSED."""
+    outlook = engine.outlook(request.frame)
+    tag = _tag(outlook, request)
+    if tag in request.known_tags:
+        return FrameAnswer(None, tag, outlook, 0.0)
+    frame = engine.frame(request.frame)
+    return FrameAnswer(encode(frame.image, request.frame.layer, request.encoding), tag, frame.outlook, frame.seconds)
+
+
+def _tag(outlook: Outlook, request: GetFrame) -> str:
+    """An entity tag: the same for the same picture in the same encoding."""
+    asked = f"{outlook.tag} {request.frame} {request.encoding}"
+    return hashlib.blake2s(asked.encode(), digest_size=12).hexdigest()
+
+
+def refusal_of(error: SolverError | MemoryError) -> Refusal:
+    """How a refused request is told."""
+    match error:
+        case SceneError():
+            return Refusal(RefusalKind.INVALID, error.message, error.location)
+        case RevisionConflictError():
+            return Refusal(RefusalKind.CONFLICT, str(error))
+        case LimitExceededError():
+            return Refusal(RefusalKind.LIMIT, str(error))
+        case NotAvailableError():
+            return Refusal(RefusalKind.NOT_AVAILABLE, str(error), (error.what,))
+        case RenderingUnavailableError():
+            return Refusal(RefusalKind.NO_RENDERING, str(error))
+        case MemoryError():
+            return Refusal(RefusalKind.LIMIT, "this needs more memory than there is")
+        case _:
+            return Refusal(RefusalKind.INVALID, str(error))

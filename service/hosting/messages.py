@@ -1,0 +1,172 @@
+"""What the web process and a worker say to each other.
+
+Each request is a frozen dataclass whose type parameter is what it is answered with. They travel as
+pickles over a socket pair that only the two processes hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Generic, TypeAlias, TypeVar
+
+from solver.document.edits import Edit
+from solver.document.fields import Location
+from solver.document.limits import SceneLimits
+from solver.document.settings import SettingsDocument
+from solver.engine.requests import Encoding, FrameRequest, Wait
+from solver.engine.status import Change, EngineStatus, ProbeResult
+from solver.engine.views import Outlook
+from solver.geometry.scene import Scene
+from solver.transport.settings import SolverSettings
+from solver.types import FloatArray, Points
+
+R = TypeVar("R")
+
+
+class Request(Generic[R]):
+    """A request that is answered with an R."""
+
+
+@dataclass(frozen=True)
+class Open(Request[EngineStatus]):
+    """Make the worker's engine. Its first request."""
+
+    scene: Scene
+    settings: SolverSettings
+    limits: SceneLimits
+
+
+@dataclass(frozen=True)
+class GetStatus(Request[EngineStatus]):
+    """How the session stands."""
+
+
+@dataclass(frozen=True)
+class SceneAnswer:
+    """The scene of a revision."""
+
+    revision: int
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class GetScene(Request[SceneAnswer]):
+    """The scene as it stands."""
+
+
+@dataclass(frozen=True)
+class Configure(Request[EngineStatus]):
+    """Change the solver settings that the document gives."""
+
+    changes: SettingsDocument
+
+
+@dataclass(frozen=True)
+class EditsAnswer:
+    """What a batch did."""
+
+    revision: int
+    changes: tuple[Change, ...]
+
+
+@dataclass(frozen=True)
+class ApplyEdits(Request[EditsAnswer]):
+    """Apply a batch of edits."""
+
+    edits: tuple[Edit, ...]
+    if_revision: int | None
+
+
+@dataclass(frozen=True)
+class FrameAnswer:
+    """An encoded frame; without content where the client has it already."""
+
+    content: bytes | None
+    tag: str
+    outlook: Outlook
+    seconds: float
+    """What drawing it took"""
+
+
+@dataclass(frozen=True)
+class GetFrame(Request[FrameAnswer]):
+    """A frame, once it is good enough or time is up."""
+
+    frame: FrameRequest
+    encoding: Encoding
+    wait: Wait
+    timeout: float
+    """Seconds"""
+    known_tags: frozenset[str]
+    """Frames of these tags need not be sent"""
+
+
+@dataclass(frozen=True)
+class Probe(Request[ProbeResult]):
+    """The light at points (n, 3) with normals (n, 3)."""
+
+    positions: Points
+    normals: FloatArray
+
+
+class RefusalKind(StrEnum):
+    """Why a request was refused."""
+
+    INVALID = "invalid"
+    CONFLICT = "conflict"
+    LIMIT = "limit"
+    NOT_AVAILABLE = "not_available"
+    NO_RENDERING = "no_rendering"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A request was refused, and nothing has changed."""
+
+    kind: RefusalKind
+    detail: str
+    location: Location = ()
+    """The offending field of an invalid request"""
+
+
+@dataclass(frozen=True)
+class Call:
+    """To the worker: answer a request."""
+
+    number: int
+    request: Request[object]
+
+
+@dataclass(frozen=True)
+class Abandon:
+    """To the worker: nobody waits for that answer any more."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class Answer:
+    """To the web process: what a request is answered with."""
+
+    number: int
+    value: object
+
+
+@dataclass(frozen=True)
+class Ready:
+    """To the web process: the worker has its kernels loaded and can take a session."""
+
+    rendering_problem: str | None
+    """Why it cannot draw frames, if it cannot"""
+
+
+@dataclass(frozen=True)
+class StatusChanged:
+    """To the web process: the session stands otherwise than before."""
+
+    status: EngineStatus
+
+
+ToWorker: TypeAlias = Call | Abandon
+FromWorker: TypeAlias = Ready | Answer | StatusChanged

@@ -1,0 +1,167 @@
+"""A worker process as the web process sees it: calls with answers, its latest status, its end."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Final, TypeVar, cast
+
+from service.hosting.messages import Abandon, Answer, Call, Ready, Refusal, Request, StatusChanged
+from service.hosting.wire import WebEnd
+from solver.engine.status import EngineStatus
+
+R = TypeVar("R")
+
+_log = logging.getLogger(__name__)
+
+_FAREWELL: Final = 2.0
+"""Seconds in which a worker whose line was hung up must have ended by itself."""
+
+
+class WorkerGoneError(Exception):
+    """The worker has ended, and with it what it held."""
+
+    def __init__(self) -> None:
+        super().__init__("the worker process of this session has ended; delete the session and post it anew")
+
+
+class RefusedError(Exception):
+    """A worker refused a request."""
+
+    def __init__(self, refusal: Refusal) -> None:
+        self.refusal = refusal
+        super().__init__(refusal.detail)
+
+
+class RemoteWorker:
+    """One worker process, from its start to its end."""
+
+    def __init__(
+        self, process: subprocess.Popen[bytes], end: WebEnd, on_lost: Callable[[], None]
+    ) -> None:
+        self._process = process
+        self._end = end
+        self._on_lost = on_lost
+        self._numbers = itertools.count(1)
+        self._pending: dict[int, asyncio.Future[object]] = {}
+        self._news = asyncio.Event()
+        self._reading: asyncio.Task[None] | None = None
+        self._closing = False
+        self.status: EngineStatus | None = None
+        """The latest that the worker has told of its session"""
+        self.gone = False
+        """Whether the worker has ended"""
+        self.rendering_problem: str | None = None
+        """Why it cannot draw frames, if it cannot"""
+
+    @classmethod
+    async def start(cls, on_lost: Callable[[], None]) -> RemoteWorker:
+        """Start a process and wait until it is warm. Raises WorkerGoneError where it does not get there.
+
+        `on_lost` is called when the process ends without having been closed.
+        """
+        ours, theirs = socket.socketpair()
+        with theirs:
+            process = await asyncio.to_thread(_spawn, theirs)
+        worker = cls(process, await WebEnd.over(ours), on_lost)
+        try:
+            ready = await worker._end.receive()
+            if not isinstance(ready, Ready):
+                raise WorkerGoneError
+        except BaseException:
+            await worker.close()
+            raise
+        worker.rendering_problem = ready.rendering_problem
+        worker._reading = asyncio.create_task(worker._read())
+        return worker
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    async def call(self, request: Request[R]) -> R:
+        """The answer to `request`. Raises RefusedError, WorkerGoneError.
+
+        A caller that is cancelled tells the worker not to bother.
+        """
+        if self.gone:
+            raise WorkerGoneError
+        number = next(self._numbers)
+        answer = self._pending[number] = asyncio.get_running_loop().create_future()
+        try:
+            await self._tell(Call(number, request))
+            value = await answer
+        except asyncio.CancelledError:
+            if not self.gone:
+                await self._tell(Abandon(number))
+            raise
+        finally:
+            self._pending.pop(number, None)
+        if isinstance(value, Refusal):
+            raise RefusedError(value)
+        return cast("R", value)
+
+    async def news(self) -> None:
+        """Return when the status has changed, or the worker has ended."""
+        await self._news.wait()
+
+    async def close(self) -> None:
+        """End the process, and wait until it has ended."""
+        self._closing = True
+        self._end.close()
+        if self._reading is not None:
+            await self._reading
+        await asyncio.to_thread(_reap, self._process)
+
+    async def _tell(self, message: Call | Abandon) -> None:
+        try:
+            await self._end.send(message)
+        except OSError as lost:
+            raise WorkerGoneError from lost
+
+    async def _read(self) -> None:
+        while (message := await self._end.receive()) is not None:
+            match message:
+                case Answer(number, value):
+                    answer = self._pending.get(number)
+                    if answer is not None and not answer.done():
+                        answer.set_result(value)
+                case StatusChanged(status):
+                    self.status = status
+                    self._spread_news()
+                case Ready():
+                    pass
+        self._lost()
+
+    def _lost(self) -> None:
+        self.gone = True
+        if not self._closing:
+            _log.error("worker %d has ended unexpectedly", self.pid)
+            self._on_lost()
+        for answer in self._pending.values():
+            if not answer.done():
+                answer.set_exception(WorkerGoneError())
+        self._spread_news()
+
+    def _spread_news(self) -> None:
+        news, self._news = self._news, asyncio.Event()
+        news.set()
+
+
+def _spawn(theirs: socket.socket) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "service.hosting.worker", str(theirs.fileno())]
+    return subprocess.Popen(command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
+
+
+def _reap(process: subprocess.Popen[bytes]) -> None:
+    try:
+        process.wait(_FAREWELL)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,167 @@
+"""The worker process: one engine, its GL context and its threads, at the end of a socket.
+
+The main thread alternates between serving requests and slices of the engine's work. A second thread
+does nothing but read, so that the process ends at once when the web process has gone, whatever the
+main thread is doing.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import socket
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from typing import Final
+
+from service.hosting.answers import REFUSED, answer, answer_frame, refusal_of
+from service.hosting.messages import (
+    Abandon,
+    Answer,
+    Call,
+    FrameAnswer,
+    GetFrame,
+    Open,
+    Ready,
+    Refusal,
+    Request,
+    StatusChanged,
+    ToWorker,
+)
+from service.hosting.wire import WorkerEnd
+from solver.engine.drawing import Drawing
+from solver.engine.engine import Engine
+from solver.engine.status import EngineStatus
+from solver.engine.warm import warm_up
+
+SLICE: Final = 0.02
+"""Seconds of work between two looks at the requests."""
+
+REPORT_INTERVAL: Final = 0.1
+"""Seconds between two reports while only the numbers of the status change."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Waiting:
+    """A frame that is not good enough yet."""
+
+    request: GetFrame
+    deadline: float
+
+
+class Host:
+    """Serves the requests to one engine, and works on it in between."""
+
+    def __init__(self, end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker], drawing: Drawing) -> None:
+        self._end = end
+        self._inbox = inbox
+        self._drawing = drawing
+        self._engine: Engine | None = None
+        self._waiting: dict[int, _Waiting] = {}
+        self._busy = False
+        self._reported: EngineStatus | None = None
+        self._report_due = 0.0
+
+    def run(self) -> None:
+        """Serve for ever: the reading thread ends the process."""
+        while True:
+            for message in self._arrived():
+                self._serve(message)
+            if self._engine is not None:
+                self._serve_waiting(self._engine)
+                self._work(self._engine)
+
+    def _arrived(self) -> list[ToWorker]:
+        """What has come; where there is nothing else to do, this waits for it."""
+        messages = []
+        try:
+            if not self._busy:
+                messages.append(self._inbox.get(timeout=self._spare_time()))
+            while True:
+                messages.append(self._inbox.get_nowait())
+        except queue.Empty:
+            return messages
+
+    def _spare_time(self) -> float | None:
+        """Seconds until a waiting frame must be sent; None where none waits."""
+        if not self._waiting:
+            return None
+        return max(0.0, min(waiting.deadline for waiting in self._waiting.values()) - time.monotonic())
+
+    def _serve(self, message: ToWorker) -> None:
+        match message:
+            case Abandon(number):
+                self._waiting.pop(number, None)
+            case Call(number, GetFrame() as request):
+                self._waiting[number] = _Waiting(request, time.monotonic() + request.timeout)
+            case Call(number, request):
+                value = self._answer(request)
+                self._report()
+                self._end.send(Answer(number, value))
+
+    def _answer(self, request: Request[object]) -> object:
+        try:
+            if self._engine is not None:
+                return answer(self._engine, request)
+            if isinstance(request, Open):
+                self._engine = Engine(request.scene, request.settings, request.limits, self._drawing)
+                return self._engine.status()
+            raise TypeError(f"{type(request).__name__} came before Open")
+        except REFUSED as error:
+            return refusal_of(error)
+
+    def _serve_waiting(self, engine: Engine) -> None:
+        """Send the frames that are as good as asked, or whose time is up."""
+        for number, waiting in tuple(self._waiting.items()):
+            request = waiting.request
+            try:
+                worth = engine.outlook(request.frame).is_worth(request.wait)
+                if not worth and time.monotonic() < waiting.deadline:
+                    continue
+                value: FrameAnswer | Refusal = answer_frame(engine, request)
+            except REFUSED as error:
+                value = refusal_of(error)
+            del self._waiting[number]
+            self._end.send(Answer(number, value))
+
+    def _work(self, engine: Engine) -> None:
+        was_busy, self._busy = self._busy, engine.step(SLICE)
+        if self._busy != was_busy or (self._busy and time.monotonic() >= self._report_due):
+            self._report()
+
+    def _report(self) -> None:
+        """Tell the status, if it is not what was told last."""
+        if self._engine is None:
+            return
+        status = self._engine.status()
+        if status != self._reported:
+            self._reported = status
+            self._end.send(StatusChanged(status))
+        self._report_due = time.monotonic() + REPORT_INTERVAL
+
+
+def _read(end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker]) -> None:
+    """Fill `inbox`, and end the process when the web process has hung up."""
+    while (message := end.receive()) is not None:
+        inbox.put(message)
+    os._exit(0)
+
+
+def main(descriptor: int) -> None:
+    """Run a worker on the socket of that file descriptor."""
+    # An interrupt from the terminal goes to all processes; the web process decides what to make of it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end = WorkerEnd(socket.socket(fileno=descriptor))
+    inbox: queue.SimpleQueue[ToWorker] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(end, inbox), name="halflight-reader", daemon=True).start()
+    drawing = Drawing()
+    warm_up(drawing)
+    end.send(Ready(drawing.problem))
+    Host(end, inbox, drawing).run()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

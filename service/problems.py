@@ -1,0 +1,183 @@
+"""Every error that a client can meet, as RFC 9457 problem details."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any, Final
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from service.hosting.messages import Refusal, RefusalKind
+from service.hosting.remote import WorkerGoneError
+from service.hosting.sessions import NoSuchSessionError, TooManySessionsError
+from solver.errors import LimitExceededError, SceneError
+
+MEDIA_TYPE: Final = "application/problem+json"
+
+
+class FieldProblem(BaseModel):
+    """What is wrong with one field of the input."""
+
+    loc: list[str | int] = Field(description="Path of the field, from `body`, `query`, `path` or `header` on.")
+    msg: str
+
+
+class Problem(BaseModel):
+    """What went wrong (RFC 9457)."""
+
+    type: str = Field(description="A URI that names the kind of problem.", examples=["urn:halflight:invalid"])
+    title: str = Field(examples=["The input is not acceptable"])
+    status: int = Field(examples=[422])
+    detail: str = Field(examples=["body.scene.objects.0.id: field required"])
+    errors: list[FieldProblem] | None = Field(default=None, description="Of bad input: the very fields.")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: its name, status and title."""
+
+    name: str
+    status: int
+    title: str
+
+
+INVALID: Final = Kind("invalid", 422, "The input is not acceptable")
+NO_SUCH_SESSION: Final = Kind("no-such-session", 404, "There is no such session")
+CONFLICT: Final = Kind("revision-conflict", 409, "The scene is at another revision")
+LIMIT: Final = Kind("limit-exceeded", 413, "More than the limit was asked for")
+TOO_MANY_SESSIONS: Final = Kind("too-many-sessions", 429, "There are too many sessions")
+UNAUTHORIZED: Final = Kind("unauthorized", 401, "A bearer token is needed")
+NOT_AVAILABLE: Final = Kind("not-available", 501, "This version cannot do that yet")
+WORKER_GONE: Final = Kind("worker-gone", 503, "The session's worker is gone")
+NO_RENDERING: Final = Kind("no-rendering", 503, "This machine cannot draw frames")
+UNSUPPORTED_MEDIA: Final = Kind("unsupported-media-type", 415, "The body is not JSON")
+NOT_ACCEPTABLE: Final = Kind("not-acceptable", 406, "No such representation")
+INTERNAL: Final = Kind("internal", 500, "Something went wrong inside")
+
+_OF_REFUSAL: Final = {
+    RefusalKind.INVALID: INVALID,
+    RefusalKind.CONFLICT: CONFLICT,
+    RefusalKind.LIMIT: LIMIT,
+    RefusalKind.NOT_AVAILABLE: NOT_AVAILABLE,
+    RefusalKind.NO_RENDERING: NO_RENDERING,
+}
+
+_PLAIN_MESSAGE: Final = {"extra_forbidden": "unknown field", "missing": "field required"}
+"""Plainer words than pydantic's, by the type of its error."""
+
+_PLAIN: Final = {
+    404: "there is nothing at {path}",
+    405: "{method} is not something to do to {path}",
+}
+"""Details of errors that the router raises, by their status."""
+
+MAX_ERRORS: Final = 20
+"""Fields told of one bad input."""
+
+
+class ProblemError(HTTPException):
+    """A request is answered with a problem."""
+
+    def __init__(
+        self,
+        kind: Kind,
+        detail: str,
+        errors: Sequence[FieldProblem] = (),
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(kind.status, detail, dict(headers or {}))
+        self.kind = kind
+        self.errors = errors
+
+    @classmethod
+    def of_field(cls, kind: Kind, location: Sequence[str | int], message: str) -> ProblemError:
+        """A problem with one field of the input."""
+        field = FieldProblem(loc=list(location), msg=message)
+        return cls(kind, _tell([field]), [field])
+
+    @classmethod
+    def of_scene(cls, error: SceneError, source: Sequence[str | int]) -> ProblemError:
+        """A scene or an edit that is not acceptable, located under `source`."""
+        return cls.of_field(INVALID, [*source, *error.location], error.message)
+
+    @classmethod
+    def of_refusal(cls, refusal: Refusal, source: str) -> ProblemError:
+        """What a worker refused; the input came from `source`: body or query."""
+        kind = _OF_REFUSAL[refusal.kind]
+        if refusal.location:
+            return cls.of_field(kind, [source, *refusal.location], refusal.detail)
+        return cls(kind, refusal.detail)
+
+
+def respond(
+    kind: Kind, detail: str, errors: Sequence[FieldProblem] = (), headers: Mapping[str, str] | None = None
+) -> JSONResponse:
+    """The response that tells a problem."""
+    problem = Problem(
+        type=f"urn:halflight:{kind.name}" if kind.name else "about:blank",
+        title=kind.title,
+        status=kind.status,
+        detail=detail,
+        errors=list(errors) or None,
+    )
+    return JSONResponse(problem.model_dump(exclude_none=True), kind.status, headers, MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Have every error of `app` told as a problem."""
+
+    @app.exception_handler(HTTPException)
+    async def of_http(request: Request, error: HTTPException) -> JSONResponse:
+        if isinstance(error, ProblemError):
+            return respond(error.kind, error.detail, error.errors, error.headers)
+        phrase = HTTPStatus(error.status_code).phrase
+        detail = _PLAIN.get(error.status_code, phrase).format(method=request.method, path=request.url.path)
+        return respond(Kind("", error.status_code, phrase), detail, headers=error.headers)
+
+    @app.exception_handler(RequestValidationError)
+    async def of_input(_: Request, error: RequestValidationError) -> JSONResponse:
+        fields = [
+            FieldProblem(loc=_location(found), msg=_PLAIN_MESSAGE.get(found["type"], found["msg"]))
+            for found in error.errors()[:MAX_ERRORS]
+        ]
+        return respond(INVALID, _tell(fields), fields)
+
+    @app.exception_handler(LimitExceededError)
+    async def of_limit(_: Request, error: LimitExceededError) -> JSONResponse:
+        return respond(LIMIT, str(error))
+
+    @app.exception_handler(NoSuchSessionError)
+    async def of_session(_: Request, error: NoSuchSessionError) -> JSONResponse:
+        return respond(NO_SUCH_SESSION, str(error))
+
+    @app.exception_handler(TooManySessionsError)
+    async def of_count(_: Request, error: TooManySessionsError) -> JSONResponse:
+        return respond(TOO_MANY_SESSIONS, str(error))
+
+    @app.exception_handler(WorkerGoneError)
+    async def of_worker(_: Request, error: WorkerGoneError) -> JSONResponse:
+        return respond(WORKER_GONE, str(error))
+
+    @app.exception_handler(Exception)
+    async def of_anything(_: Request, __: Exception) -> JSONResponse:
+        # Starlette raises the exception again once this is sent, so that the server logs it.
+        return respond(INTERNAL, "the service met an error that it did not expect, and has logged it")
+
+
+def _location(found: Mapping[str, Any]) -> list[str | int]:
+    """The path of a field in the input, without the branches of the models that pydantic puts into it."""
+    location = list(found["loc"])
+    if location[1:2] == ["edits"] and len(location) > 3:
+        del location[3]
+    return [*location, "op"] if found["type"].startswith("union_tag") else location
+
+
+def _tell(fields: Sequence[FieldProblem]) -> str:
+    first = f"{'.'.join(map(str, fields[0].loc))}: {fields[0].msg}"
+    return first if len(fields) == 1 else f"{first} (and {len(fields) - 1} more)"

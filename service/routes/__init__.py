@@ -1,0 +1,1 @@
+"""The routes of the wire contract, a file for each kind of call."""

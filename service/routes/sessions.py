@@ -1,0 +1,81 @@
+"""Sessions: open, list, look at, configure, end."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from service.context import Context, Ctx, UsedSession
+from service.hosting.messages import Configure, GetScene, GetStatus, Refusal
+from service.hosting.remote import RefusedError
+from service.json_body import JsonRoute
+from service.problems import INVALID, ProblemError, responses
+from service.schemas import SceneAnswer, SessionList, SessionRequest, SessionStatus
+from solver.document.conversion import document_of, scene_of
+from solver.document.samples import load_sample
+from solver.document.settings import SettingsDocument
+from solver.errors import SceneError
+from solver.geometry.scene import Scene
+
+router = APIRouter(tags=["sessions"], route_class=JsonRoute)
+
+
+@router.post("/sessions", status_code=201, responses=responses(413, 422, 429, 503))
+async def open_session(body: SessionRequest, request: Request, response: Response, context: Ctx) -> SessionStatus:
+    """Open a session on a scene. The solve starts at once."""
+    settings = body.settings.changes_to(context.settings.solver_defaults)
+    context.settings.check_solver(settings)
+    scene = _scene(body)
+    context.settings.scene_limits.check(scene)
+    session = await context.sessions.open(scene, settings, context.settings.scene_limits)
+    context.metrics.sessions_opened.inc()
+    response.headers["Location"] = request.url_for("session_status", id=session.id).path
+    return SessionStatus.of(session.id, await session.worker.call(GetStatus()))
+
+
+def _scene(body: SessionRequest) -> Scene:
+    if (body.scene is None) == (body.sample is None):
+        raise ProblemError.of_field(INVALID, ["body", "scene"], "give either a scene or the name of a sample")
+    try:
+        return load_sample(body.sample) if body.scene is None else scene_of(body.scene)
+    except SceneError as error:
+        raise ProblemError.of_scene(error, ["body"] if body.scene is None else ["body", "scene"]) from None
+
+
+@router.get("/sessions")
+async def list_sessions(context: Ctx) -> SessionList:
+    """The sessions that the service holds."""
+    return SessionList(
+        sessions=[
+            SessionStatus.of(session.id, session.worker.status)
+            for session in context.sessions
+            if session.worker.status is not None
+        ]
+    )
+
+
+@router.get("/sessions/{id}", responses=responses(404, 503))
+async def session_status(session: UsedSession) -> SessionStatus:
+    """How a session stands."""
+    return SessionStatus.of(session.id, await session.worker.call(GetStatus()))
+
+
+@router.delete("/sessions/{id}", status_code=204, responses=responses(404))
+async def end_session(id: str, context: Ctx) -> None:
+    """End a session and free all that it holds."""
+    await context.sessions.end(id)
+
+
+@router.get(
+    "/sessions/{id}/scene", response_model_exclude_unset=True, responses=responses(404, 503)
+)
+async def session_scene(session: UsedSession) -> SceneAnswer:
+    """The scene as it stands. Posted back, it gives an equal session."""
+    answer = await session.worker.call(GetScene())
+    return SceneAnswer(revision=answer.revision, scene=document_of(answer.scene))
+
+
+@router.patch("/sessions/{id}/settings", responses=responses(404, 413, 422, 503))
+async def configure_session(body: SettingsDocument, session: UsedSession, context: Ctx) -> SessionStatus:
+    """Change the settings that are given, while the session runs."""
+    context.settings.check_solver(body.changes_to(context.settings.solver_defaults))
+    return SessionStatus.of(session.id, await session.worker.call(Configure(body)))

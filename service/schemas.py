@@ -1,0 +1,190 @@
+"""What the service sends and takes, beside the scene document itself."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from solver.document.edits import Edit
+from solver.document.fields import Closed, Direction, Point
+from solver.document.models import SceneDocument
+from solver.document.settings import SettingsDocument
+from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
+
+
+class SessionRequest(Closed):
+    """A scene to be solved: one given here, or one that ships with the service, by name."""
+
+    scene: SceneDocument | None = None
+    sample: str | None = Field(
+        default=None,
+        strict=True,
+        min_length=1,
+        max_length=200,
+        description="A name from `GET /v1/scenes`, in place of `scene`.",
+        examples=["cornell"],
+    )
+    settings: SettingsDocument = SettingsDocument()
+
+
+class SessionStatus(BaseModel):
+    """How a session stands."""
+
+    id: str
+    name: str = Field(description="The scene's name.")
+    revision: int = Field(description="Counts the edit batches: 1 for the scene as it was posted.")
+    state: SessionState = Field(
+        description="`converged` only when `error_estimate` is within `settings.error_tolerance` and nothing is "
+        "left to redistribute; `paused` when a limit of the settings was reached before, and a warning says which."
+    )
+    progress: float = Field(ge=0.0, le=1.0)
+    error_estimate: float = Field(
+        ge=0.0,
+        description="Estimated relative error of the radiosity field against the exact solution of the scene.",
+    )
+    unshot_fraction: float = Field(ge=0.0, description="Share of the radiosity that is received and not passed on.")
+    statistics: dict[str, int | float] = Field(
+        description="Counts: `polygons`, `elements`, `links`, and more.",
+        examples=[{"polygons": 16, "elements": 2412, "links": 30117}],
+    )
+    warnings: list[str]
+    settings: SettingsDocument
+
+    @classmethod
+    def of(cls, session_id: str, status: EngineStatus) -> SessionStatus:
+        """The wire's form of a status."""
+        return cls(
+            id=session_id,
+            name=status.name,
+            revision=status.revision,
+            state=status.state,
+            progress=status.progress,
+            error_estimate=status.error_estimate,
+            unshot_fraction=status.unshot_fraction,
+            statistics=asdict(status.statistics),
+            warnings=list(status.warnings),
+            settings=SettingsDocument.describing(status.settings),
+        )
+
+
+class SessionList(BaseModel):
+    """The sessions that the service holds."""
+
+    sessions: list[SessionStatus]
+
+
+class SceneAnswer(BaseModel):
+    """The scene as it stands: posted back, it gives an equal session."""
+
+    revision: int
+    scene: SceneDocument
+
+
+class SampleScene(BaseModel):
+    """A scene that ships with the service."""
+
+    name: str
+    objects: int
+    polygons: int
+    cameras: list[str]
+
+
+class SampleList(BaseModel):
+    """The scenes that ship with the service."""
+
+    scenes: list[SampleScene]
+
+
+class EditBatch(Closed):
+    """Edits that are applied all, in their order, or not at all."""
+
+    edits: list[Edit] = Field(min_length=1)
+    if_revision: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
+        default=None, description="Refuse the batch with 409 where the scene is at another revision."
+    )
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "if_revision": 1,
+                    "edits": [
+                        {"op": "move", "id": "short_block", "transform": {"translation": [0.05, 0, 0]}},
+                        {"op": "set_material", "id": "floor", "material": {"reflectance": [0.2, 0.2, 0.6]}},
+                    ],
+                }
+            ]
+        }
+    )
+
+
+class LogEntry(BaseModel):
+    """One change, and how far the light has followed it."""
+
+    entry: int = Field(description="Number of the entry in the session, from 1.")
+    revision: int = Field(description="The revision that the change made.")
+    op: str
+    id: str = Field(description="The object that changed.")
+    state: ChangeState
+    energy_to_redistribute: float = Field(
+        description="W of luminance that the change takes away or brings, as far as the solution knew it."
+    )
+    shots: int = Field(description="Links over which the change has been shot so far.")
+
+    @classmethod
+    def of(cls, change: Change) -> LogEntry:
+        """The wire's form of a change."""
+        return cls(**asdict(change))
+
+
+class EditsAnswer(BaseModel):
+    """What a batch did. The light follows."""
+
+    revision: int
+    changes: list[LogEntry]
+
+
+class ProbePoint(Closed):
+    """A point and the direction that it faces."""
+
+    position: Point = Field(description="Metres.")
+    normal: Direction = Field(description="Of any length but 0. The point receives light from the side that it points to.")
+
+
+class ProbeRequest(Closed):
+    """Points at which to measure."""
+
+    points: list[ProbePoint]
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"points": [{"position": [0.28, 0.0, 0.28], "normal": [0, 1, 0]}]}]}
+    )
+
+
+class ProbeAnswer(BaseModel):
+    """The light at the points, in their order."""
+
+    revision: int
+    irradiance: list[list[float]] = Field(description="R, G, B in W/m2.")
+    illuminance: list[float] = Field(description="lux")
+    error_estimate: list[float] = Field(description="Estimated relative error of each.")
+
+    @classmethod
+    def of(cls, result: ProbeResult) -> ProbeAnswer:
+        """The wire's form of a measurement."""
+        return cls(
+            revision=result.revision,
+            irradiance=result.irradiance.tolist(),
+            illuminance=result.illuminance.tolist(),
+            error_estimate=result.error_estimate.tolist(),
+        )
+
+
+class Health(BaseModel):
+    """The service is up."""
+
+    status: str = "ok"
+    version: str
+    sessions: int

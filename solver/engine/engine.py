@@ -1,0 +1,182 @@
+"""One session's state machine: edits in, time-sliced work, frames and probes out.
+
+An engine has no threads and no clock of its own: whoever owns it calls `step` for as long as it
+returns True, and anything else between two steps. An edit replaces world and solution at once, so that
+whatever is asked next sees the new geometry, with the light that is still valid.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver.document.edits import Edit, apply_edits
+from solver.document.limits import SceneLimits
+from solver.engine.drawing import BEST_RENDERER, Drawing
+from solver.engine.paths import PathFrames
+from solver.engine.requests import FrameRequest, LayerName, NotAvailableError, RendererName
+from solver.engine.solution import Solution
+from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
+from solver.engine.views import Frame, Outlook, PathView, SolutionView, View
+from solver.engine.world import World
+from solver.errors import RevisionConflictError
+from solver.geometry.scene import Scene
+from solver.transport.settings import SolverSettings
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
+
+
+class Engine:
+    """A scene, its solution, and the frames of it."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: SolverSettings | None = None,
+        limits: SceneLimits | None = None,
+        drawing: Drawing | None = None,
+    ) -> None:
+        """Take `scene` as revision 1. `drawing` makes the frames, and may be shared by engines of one thread.
+
+        Raises LimitExceededError.
+        """
+        self._limits = limits or SceneLimits()
+        self._limits.check(scene)
+        self._settings = settings or SolverSettings()
+        self._drawing = drawing or Drawing()
+        self._revision = 1
+        self._entries = 0
+        self._turn = 0
+        self._settle(World.of(scene), None)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as it stands."""
+        return self._world.scene
+
+    @property
+    def revision(self) -> int:
+        """Counts the edit batches: 1 for the scene as it was given."""
+        return self._revision
+
+    @property
+    def settings(self) -> SolverSettings:
+        """What the solve goes by."""
+        return self._settings
+
+    def apply(self, edits: Sequence[Edit], if_revision: int | None = None) -> tuple[Change, ...]:
+        """Apply all of `edits`, or none.
+
+        Raises RevisionConflictError where `if_revision` is given and not the current one, SceneError
+        located in `edits.<index>`, LimitExceededError.
+        """
+        if if_revision is not None and if_revision != self._revision:
+            raise RevisionConflictError(if_revision, self._revision)
+        scene = apply_edits(self.scene, edits)
+        self._limits.check(scene)
+        world = World.of(scene, self._world)
+        changes = self._changes(edits, world)
+        self._settle(world, self._solution)
+        self._revision += 1
+        self._entries += len(changes)
+        return changes
+
+    def configure(self, settings: SolverSettings) -> None:
+        """Solve on by other settings."""
+        if settings != self._settings:
+            self._settings = settings
+            self._settle(self._world, self._solution)
+
+    def step(self, budget: float) -> bool:
+        """Work for about `budget` seconds; True while more work remains."""
+        solving = self._solution.state is SessionState.SOLVING
+        tracing = self._paths.step(0.5 * budget if solving else budget, self._settings.error_tolerance)
+        solving = self._solution.step(0.5 * budget if tracing else budget)
+        return solving or tracing
+
+    def status(self) -> EngineStatus:
+        """How the session stands."""
+        solution, solver = self._solution, self._solution.solver
+        return EngineStatus(
+            name=self.scene.name,
+            revision=self._revision,
+            state=solution.state,
+            progress=solver.progress,
+            error_estimate=solution.error_estimate,
+            unshot_fraction=solver.unshot_fraction,
+            statistics=solver.statistics(),
+            warnings=solution.warnings,
+            settings=self._settings,
+        )
+
+    def outlook(self, request: FrameRequest) -> Outlook:
+        """What a frame drawn now would be. Raises NotAvailableError, SceneError."""
+        return self._outlook(request, self._view(request))
+
+    def frame(self, request: FrameRequest) -> Frame:
+        """The frame as well as it can be drawn now.
+
+        Raises NotAvailableError, SceneError, RenderingUnavailableError.
+        """
+        view = self._view(request)
+        start = time.perf_counter()
+        image = view.draw()
+        return Frame(image, self._outlook(request, view), time.perf_counter() - start)
+
+    def probe(self, positions: Points, normals: FloatArray) -> ProbeResult:
+        """The exact gather from the current solution at points (n, 3) with normals (n, 3) of any length."""
+        unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        irradiance, error = self._solution.solver.irradiance_at(positions, unit)
+        return ProbeResult(
+            revision=self._revision,
+            irradiance=irradiance,
+            illuminance=self.scene.luminous_efficacy * (irradiance @ LUMINANCE_WEIGHTS),
+            error_estimate=error,
+        )
+
+    def _settle(self, world: World, warm_start: Solution | None) -> None:
+        """Let light settle in `world`, anew or from `warm_start`."""
+        solution = Solution(world, self._settings, warm_start)
+        self._world, self._solution, self._paths = world, solution, PathFrames(world)
+        self._turn += 1
+
+    def _view(self, request: FrameRequest) -> View:
+        renderer = _renderer_of(request)
+        camera = request.camera.resolve(self.scene)
+        if renderer is RendererName.PATH:
+            if request.layer is not LayerName.RADIANCE:
+                raise NotAvailableError("layer of the path renderer", request.layer, (LayerName.RADIANCE,))
+            return PathView(self._paths.ask(camera, request.samples), self._settings.error_tolerance)
+        self._drawing.require(renderer, request.layer)
+        return SolutionView(self._solution, self._drawing, camera, renderer, request.layer, request.samples)
+
+    def _outlook(self, request: FrameRequest, view: View) -> Outlook:
+        return Outlook(
+            tag=f"{self._turn}.{view.version}",
+            renderer=_renderer_of(request),
+            revision=self._revision,
+            error_estimate=view.error_estimate,
+            converged=view.converged,
+            drawable=view.drawable,
+            improving=view.improving,
+        )
+
+    def _changes(self, edits: Sequence[Edit], after: World) -> tuple[Change, ...]:
+        power, emitted = self._solution.power_by_object(), after.emission_by_object()
+        return tuple(
+            Change(
+                entry=self._entries + number,
+                revision=self._revision + 1,
+                op=edit.op,
+                id=edit.object_id,
+                state=ChangeState.PENDING,
+                energy_to_redistribute=power.get(edit.object_id, emitted.get(edit.object_id, 0.0)),
+                shots=0,
+            )
+            for number, edit in enumerate(edits, 1)
+        )
+
+
+def _renderer_of(request: FrameRequest) -> RendererName:
+    return request.renderer or BEST_RENDERER

@@ -1,0 +1,83 @@
+"""What an engine tells of itself: frozen snapshots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from solver.transport.settings import SolverSettings
+from solver.transport.solve import SolverStatistics
+from solver.types import FloatArray
+
+
+class SessionState(StrEnum):
+    """How a session stands."""
+
+    SOLVING = "solving"
+    """The solution is being worked on."""
+    CONVERGED = "converged"
+    """The estimated error is within the tolerance and nothing is left to redistribute."""
+    PAUSED = "paused"
+    """A limit in the settings was reached before the tolerance; a warning says which. Changing the
+    settings or the scene starts the work again."""
+    FAILED = "failed"
+    """The solve met an error that it cannot go on from; a warning says which. An edit starts anew."""
+
+
+class ChangeState(StrEnum):
+    """How far the light has followed a change."""
+
+    PENDING = "pending"
+    REDISTRIBUTING = "redistributing"
+    SETTLED = "settled"
+
+
+@dataclass(frozen=True)
+class EngineStatus:
+    """One moment of an engine."""
+
+    name: str
+    revision: int
+    """Counts the edit batches: 1 for the scene as it was given."""
+    state: SessionState
+    progress: float
+    """0 to 1"""
+    error_estimate: float
+    """Estimated relative error of the radiosity field against the exact solution of the scene."""
+    unshot_fraction: float
+    """Share of the radiosity that has been received and not yet passed on."""
+    statistics: SolverStatistics
+    warnings: tuple[str, ...]
+    settings: SolverSettings
+
+
+@dataclass(frozen=True)
+class Change:
+    """One entry of the change log."""
+
+    entry: int
+    """Number of the entry in the session, from 1."""
+    revision: int
+    """The revision that the change made."""
+    op: str
+    id: str
+    """The object that changed."""
+    state: ChangeState
+    energy_to_redistribute: float
+    """W of luminance that the change takes away or brings, as far as the solution knew it: what the object
+    sent out before it, or, of an object that is added, what it emits."""
+    shots: int
+    """Links over which the change has been shot so far."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProbeResult:
+    """The light at n points."""
+
+    revision: int
+    irradiance: FloatArray
+    """(n, 3) W/m2"""
+    illuminance: FloatArray
+    """(n,) lux"""
+    error_estimate: FloatArray
+    """(n,) relative"""

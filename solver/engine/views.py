@@ -1,0 +1,158 @@
+"""What a frame request looks at: the radiosity solution, or a path-traced frame.
+
+A view tells how good a frame of it would be now, whether that can still get better, and draws it. The
+choice between the two is made once, when the request is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from solver.engine.drawing import Drawing
+from solver.engine.paths import AskedFrame
+from solver.engine.requests import LayerName, RendererName, Wait
+from solver.engine.solution import Solution
+from solver.engine.status import SessionState
+from solver.geometry.scene import Camera
+from solver.types import AnyArray
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What a frame would be if it were drawn now."""
+
+    tag: str
+    """Frames of one request and one tag are the same"""
+    renderer: RendererName
+    revision: int
+    error_estimate: float
+    """Estimated relative error of the light in it"""
+    converged: bool
+    """Whether that is within the tolerance of the settings"""
+    drawable: bool
+    """Whether there is anything to draw yet"""
+    improving: bool
+    """Whether it would be better if it were drawn later"""
+
+    def is_worth(self, wait: Wait) -> bool:
+        """Whether the frame can be drawn, and is as good as `wait` asks or as it will ever be."""
+        good = wait.is_over(self.error_estimate, self.converged) or not self.improving
+        return self.drawable and good
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A picture, not yet encoded."""
+
+    image: AnyArray
+    """(height, width, ...), top row first; what a pixel holds is the layer's."""
+    outlook: Outlook
+    seconds: float
+    """What drawing it took"""
+
+
+class View(Protocol):
+    """What a frame is drawn from."""
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there is anything to draw yet."""
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative error of a frame drawn now."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether that is within the tolerance of the settings."""
+
+    @property
+    def improving(self) -> bool:
+        """Whether a frame drawn later will be better."""
+
+    @property
+    def version(self) -> int:
+        """Frames of one version are the same."""
+
+    def draw(self) -> AnyArray:
+        """The picture, (height, width, ...)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SolutionView:
+    """The radiosity solution seen by a camera."""
+
+    solution: Solution
+    drawing: Drawing
+    camera: Camera
+    renderer: RendererName
+    layer: LayerName
+    samples: int
+
+    @property
+    def drawable(self) -> bool:
+        """The field can be drawn from the first moment on."""
+        return True
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative error of the radiosity field."""
+        return self.solution.error_estimate
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solution is."""
+        return self.solution.state is SessionState.CONVERGED
+
+    @property
+    def improving(self) -> bool:
+        """Whether the solution is worked on."""
+        return self.solution.state is SessionState.SOLVING
+
+    @property
+    def version(self) -> int:
+        """The version of the field."""
+        return self.solution.version
+
+    def draw(self) -> AnyArray:
+        """The picture. Raises RenderingUnavailableError."""
+        world = self.solution.world
+        return self.drawing.draw(world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class PathView:
+    """A path-traced frame in the making."""
+
+    asked: AskedFrame
+    tolerance: float
+
+    @property
+    def drawable(self) -> bool:
+        """Whether every pixel has its samples."""
+        return self.asked.frame.samples >= self.asked.samples
+
+    @property
+    def error_estimate(self) -> float:
+        """Relative RMS error of the frame that its own spread tells; 1 until it can."""
+        return min(1.0, self.asked.error_estimate)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the noise is within the tolerance."""
+        return self.asked.error_estimate <= self.tolerance
+
+    @property
+    def improving(self) -> bool:
+        """More paths always help, until the frame is as good as asked."""
+        return not self.converged
+
+    @property
+    def version(self) -> int:
+        """Rays in the mean."""
+        return self.asked.frame.ray_count
+
+    def draw(self) -> AnyArray:
+        """Radiance, (height, width, 3) W/(m2 sr)."""
+        return self.asked.frame.radiance
