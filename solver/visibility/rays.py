@@ -22,6 +22,11 @@ CHUNK: Final = 16384
 """Rays per Embree call: large enough to hide the 9 us of a call, small enough to balance the cores."""
 
 
+def embree_version() -> str:
+    """The version of the Embree library, as it tells it."""
+    return str(rtcore.EmbreeDevice()).removeprefix("Embree version:").strip()
+
+
 @dataclass(frozen=True, eq=False)
 class Hits:
     """What rays hit first."""

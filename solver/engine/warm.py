@@ -1,0 +1,185 @@
+"""Everything that a session may call, called once on tiny scenes, so that no client waits for a compiler.
+
+Kernels are compiled for the types they are called with and kept on disk beside their sources. What is
+compiled already is loaded, which takes a second or two in all: workers do that before they take a
+session. The scenes are chosen for the paths that light takes through the code: closed and open, grey
+and coloured, quadrilaterals and triangles, full, partial and no visibility, emitters and none, edits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver.document.edits import MoveEdit, RemoveEdit, SetMaterialEdit
+from solver.document.models import MaterialDocument, TransformDocument
+from solver.engine.drawing import Drawing
+from solver.engine.engine import Engine
+from solver.engine.requests import CameraChoice, FrameRequest, LayerName, NotAvailableError, RendererName
+from solver.engine.world import World
+from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
+from solver.pathtracing import PathTracer
+from solver.rendering.tessellation import Tessellator
+from solver.transport.settings import SolverSettings
+from solver.transport.solve import RadiositySolver
+
+_SLICE: Final = 1.0
+_SETTINGS: Final = SolverSettings(error_tolerance=0.03)
+"""Reached by some rounds of refinement, so that links are split, resampled and inherited."""
+
+_GREY: Final = (0.5, 0.5, 0.5)
+_RED: Final = (0.6, 0.3, 0.2)
+_DARK: Final = (0.0, 0.0, 0.0)
+_LIGHT: Final = (9.0, 9.0, 9.0)
+_WARM_LIGHT: Final = (9.0, 8.0, 6.0)
+
+_CUBE: Final = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+_INWARD: Final = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6))
+"""Floor, ceiling, then the walls, seen from inside."""
+
+_Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class WarmStep:
+    """One part of the warming up."""
+
+    name: str
+    """Told to people."""
+    run: Callable[[], object]
+
+
+def warm_up(drawing: Drawing) -> None:
+    """Call everything once. Where `drawing` cannot draw here, that part is left out."""
+    for step in warm_steps(drawing):
+        step.run()
+
+
+def warm_steps(drawing: Drawing) -> tuple[WarmStep, ...]:
+    """The parts of `warm_up`, to be run in their order by the thread that made `drawing`."""
+    return (
+        WarmStep("solve a closed grey room", lambda: _solve(_room(_GREY, _LIGHT, range(6)))),
+        WarmStep("solve an open coloured one", lambda: _solve(_room(_RED, _WARM_LIGHT, range(5)))),
+        WarmStep("solve without light", lambda: _solve(_room(_GREY, _DARK, range(6)))),
+        WarmStep("edit and probe", lambda: _edit(drawing)),
+        WarmStep("mesh", _mesh),
+        WarmStep("draw", lambda: _draw(drawing)),
+        WarmStep("trace paths", _trace),
+    )
+
+
+def _room(reflectance: _Colour, emission: _Colour, faces: range) -> Scene:
+    """Walls of a unit cube, a lamp, a two-sided screen in the middle, and a table of a concave face."""
+    white = Material(np.array(reflectance), np.zeros(3))
+    objects = (
+        SceneObject("walls", Mesh(_CUBE, tuple(_INWARD[k] for k in faces)), white),
+        SceneObject(
+            "lamp",
+            Mesh(np.array([[0.4, 0.4, 0.9], [0.4, 0.6, 0.9], [0.6, 0.6, 0.9]]), ((0, 1, 2),)),
+            Material(np.zeros(3), np.array(emission)),
+        ),
+        SceneObject(
+            "screen",
+            Mesh(
+                np.array([[0.3, 0.5, 0.1], [0.7, 0.5, 0.1], [0.7, 0.5, 0.6], [0.3, 0.5, 0.6]]),
+                ((0, 1, 2, 3),),
+            ),
+            Material(np.array(reflectance), np.zeros(3), two_sided=True),
+        ),
+        SceneObject(
+            "table",
+            Mesh(
+                np.array(
+                    [[0.1, 0.1, 0.3], [0.5, 0.1, 0.3], [0.5, 0.2, 0.3], [0.2, 0.2, 0.3], [0.1, 0.4, 0.3]]
+                ),
+                ((0, 1, 2, 3, 4),),
+            ),
+            white,
+        ),
+    )
+    camera = Camera(
+        eye=np.array([0.9, 0.1, 0.8]),
+        target=np.array([0.4, 0.6, 0.3]),
+        up=np.array([0.0, 0.0, 1.0]),
+        vertical_fov=60.0,
+        width=32,
+        height=24,
+    )
+    return Scene(objects={o.id: o for o in objects}, cameras={"main": camera})
+
+
+def _solve(scene: Scene) -> tuple[World, RadiositySolver]:
+    world = World.of(scene)
+    solver = RadiositySolver(world.surfaces, world.rays, _SETTINGS)
+    while solver.step(_SLICE):
+        pass
+    solver.field()
+    return world, solver
+
+
+def _edit(drawing: Drawing) -> None:
+    """A grey solution that becomes a coloured one, loses an object and has one moved."""
+    engine = Engine(_room(_GREY, _LIGHT, range(6)), _SETTINGS, drawing=drawing)
+    _run(engine)
+    engine.apply(
+        [
+            SetMaterialEdit(op="set_material", id="table", material=MaterialDocument(reflectance=list(_RED))),
+            MoveEdit(op="move", id="screen", transform=TransformDocument(translation=[0.0, 0.1, 0.0])),
+            RemoveEdit(op="remove", id="lamp"),
+        ]
+    )
+    _run(engine)
+    engine.probe(np.array([[0.5, 0.3, 0.0], [0.0, 0.5, 0.5]]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
+    engine.status()
+
+
+def _run(engine: Engine) -> None:
+    while engine.step(_SLICE):
+        pass
+
+
+def _mesh() -> None:
+    """Meshes without and with seams between elements of different size; also where frames can't be drawn."""
+    scene = _room(_RED, _WARM_LIGHT, range(6))
+    world, solver = _solve(scene)
+    Tessellator(world.surfaces).mesh(solver.field())
+
+
+def _draw(drawing: Drawing) -> None:
+    if drawing.problem is not None:
+        return
+    engine = Engine(_room(_RED, _WARM_LIGHT, range(5)), _SETTINGS, drawing=drawing)
+    _run(engine)
+    for request in _drawable(drawing):
+        engine.frame(request)
+
+
+def _drawable(drawing: Drawing) -> Iterator[FrameRequest]:
+    """Frames of every renderer and layer that there is."""
+    for renderer in RendererName:
+        for layer in LayerName:
+            if renderer is RendererName.PATH:
+                continue
+            try:
+                drawing.require(renderer, layer)
+            except NotAvailableError:
+                continue
+            for samples in (1, 4):
+                yield FrameRequest(CameraChoice(), renderer, layer, samples)
+
+
+def _trace() -> None:
+    """A path-traced frame, and irradiance at points and on elements."""
+    scene = _room(_RED, _WARM_LIGHT, range(5))
+    world = World.of(scene)
+    tracer = PathTracer(world.surfaces, world.rays)
+    frame = tracer.frame(scene.cameras["main"], 4)
+    while frame.passes < 2:
+        frame.step(0.0)
+    surfaces = world.surfaces
+    tracer.irradiance(surfaces.corners[:2].mean(axis=1), surfaces.normal[:2], 32)
+    patches = np.arange(surfaces.patch_count, dtype=np.int32)
+    tracer.mean_irradiance(surfaces.corners, surfaces.corner_count, patches, 32)
