@@ -62,11 +62,19 @@ def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
     return bool(np.all(from_front | two_sided))
 
 
-def rescale(closure: FloatArray, row_sum: FloatArray, leaf: BoolArray, closed: bool) -> FloatArray:
-    """One Sinkhorn step: new scale factors (n,) from the row sums (n,) that the present ones give."""
-    trusted = leaf & (np.abs(row_sum - 1.0) < _LIMIT)
-    if not closed:
-        trusted &= row_sum > 1.15
+def rescale(
+    closure: FloatArray, row_sum: FloatArray, leaf: BoolArray, limit: FloatArray, closed: bool
+) -> FloatArray:
+    """One Sinkhorn step: new scale factors (n,) from the row sums (n,) that the present ones give.
+
+    In an open scene the row sums are what they are, and only those above `limit` (n,), which would let
+    light multiply, are brought down to it.
+    """
+    if closed:
+        target = np.where(leaf & (np.abs(row_sum - 1.0) < _LIMIT), 1.0, row_sum)
+    else:
+        target = np.where(leaf, np.minimum(row_sum, limit), row_sum)
     out = closure.copy()
-    out[trusted] = closure[trusted] / np.sqrt(row_sum[trusted])
+    off = target != row_sum
+    out[off] *= np.sqrt(target[off] / row_sum[off])
     return out

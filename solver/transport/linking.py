@@ -6,7 +6,6 @@ blockers. Pairs without blockers cost no ray ("model only what a scene needs").
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,9 +15,9 @@ from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.kernels import kernel
 from solver.parallel import run_chunks
+from solver.transport.deviation import form_factor_deviation
 from solver.transport.elements import ElementTree
 from solver.transport.exchange import exchange_area, heights
-from solver.transport.lambert import point_form_factor
 from solver.transport.links import LinkBatch, ragged_indices
 from solver.transport.oracle import samples_needed
 from solver.types import Corners, FloatArray, Int64Array, IntArray
@@ -28,7 +27,6 @@ from solver.visibility.rays import RayScene
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, first_blockers, inherited_blockers
 
 _CHUNK: Final = 256
-_GAUSS: Final = 0.5 - 0.5 / math.sqrt(3.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,16 +175,16 @@ class Linker:
         for count in np.unique(samples[partial]):
             part = partial[samples[partial] == count]
             found = visible_fractions(
-                self.rays, p[part], q[part], open_exchange[part], tree.corners, tree.corner_count, tree.area,
+                self.rays, p[part], q[part], tree.corners, tree.corner_count, tree.area,
                 tree.patch, self.surfaces.normal, int(count),
             )  # fmt: skip
             seen = found.visibility
             visibility[part] = seen
             noise[part] = found.noise
-            mean_p = open_exchange[part] / tree.area[p[part]]
-            mean_q = open_exchange[part] / tree.area[q[part]]
-            deviation_p[part] = np.sqrt((seen * deviation_p[part]) ** 2 + mean_p**2 * found.spread_p)
-            deviation_q[part] = np.sqrt((seen * deviation_q[part]) ** 2 + mean_q**2 * found.spread_q)
+            for deviation, end, spread in ((deviation_p, p, found.spread_p), (deviation_q, q, found.spread_q)):
+                mean = open_exchange[part] / tree.area[end[part]]
+                varied = deviation[part] ** 2
+                deviation[part] = np.sqrt(seen**2 * varied + (mean**2 + varied) * spread)
         alive = (open_exchange > 0.0) | (kind == NONE)
         ends = np.cumsum(kept, dtype=np.int64)
         return LinkBatch(
@@ -303,76 +301,9 @@ def _exchange(
             tolerance, scratch,
         )  # fmt: skip
         if exchange[pair] > 0.0:
-            deviation_p[pair] = _deviation(
-                corners[i], counts[i], n1, corners[j], counts[j], n2, area[j], scratch[0]
+            deviation_p[pair] = form_factor_deviation(
+                corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], exchange[pair], scratch[0]
             )
-            deviation_q[pair] = _deviation(
-                corners[j], counts[j], n2, corners[i], counts[i], n1, area[i], scratch[0]
+            deviation_q[pair] = form_factor_deviation(
+                corners[j], counts[j], n2, area[j], corners[i], counts[i], n1, area[i], exchange[pair], scratch[0]
             )
-
-
-@kernel
-def _deviation(
-    receiver: FloatArray,
-    count: int,
-    normal: FloatArray,
-    source: FloatArray,
-    source_count: int,
-    source_normal: FloatArray,
-    source_area: float,
-    scratch: FloatArray,
-) -> float:
-    """RMS deviation over a receiver of the unoccluded form factor to a source, from 4 (3) Gauss points.
-
-    The points integrate quadratic functions exactly, so that the deviation is that of the form factor's
-    linear part. A distant source is taken as a point.
-    """
-    cx = 0.0
-    cy = 0.0
-    cz = 0.0
-    for k in range(source_count):
-        cx += source[k, 0] / source_count
-        cy += source[k, 1] / source_count
-        cz += source[k, 2] / source_count
-    sx = source[0, 0] - cx
-    sy = source[0, 1] - cy
-    sz = source[0, 2] - cz
-    radius2 = sx * sx + sy * sy + sz * sz
-    total = 0.0
-    square_total = 0.0
-    for k in range(count):
-        # Each point is a blend of a corner and the centre of the receiver.
-        if count == 4:
-            m = (k + 1) % 4
-            o = (k + 2) % 4
-            n = (k + 3) % 4
-            wk = (1.0 - _GAUSS) * (1.0 - _GAUSS)
-            ws = _GAUSS * (1.0 - _GAUSS)
-            wo = _GAUSS * _GAUSS
-            x = wk * receiver[k, 0] + ws * (receiver[m, 0] + receiver[n, 0]) + wo * receiver[o, 0]
-            y = wk * receiver[k, 1] + ws * (receiver[m, 1] + receiver[n, 1]) + wo * receiver[o, 1]
-            z = wk * receiver[k, 2] + ws * (receiver[m, 2] + receiver[n, 2]) + wo * receiver[o, 2]
-        else:
-            m = (k + 1) % 3
-            o = (k + 2) % 3
-            x = (4.0 * receiver[k, 0] + receiver[m, 0] + receiver[o, 0]) / 6.0
-            y = (4.0 * receiver[k, 1] + receiver[m, 1] + receiver[o, 1]) / 6.0
-            z = (4.0 * receiver[k, 2] + receiver[m, 2] + receiver[o, 2]) / 6.0
-        dx = cx - x
-        dy = cy - y
-        dz = cz - z
-        square = dx * dx + dy * dy + dz * dz
-        value = 0.0
-        if square > 9.0 * radius2:
-            cosine1 = dx * normal[0] + dy * normal[1] + dz * normal[2]
-            cosine2 = -(dx * source_normal[0] + dy * source_normal[1] + dz * source_normal[2])
-            if cosine1 > 0.0 and cosine2 > 0.0:
-                value = cosine1 * cosine2 * source_area / (math.pi * square * square)
-        else:
-            value = point_form_factor(
-                x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch
-            )
-        total += value
-        square_total += value * value
-    mean = total / count
-    return math.sqrt(max(0.0, square_total / count - mean * mean))

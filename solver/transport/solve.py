@@ -50,6 +50,9 @@ import os
 LEAF=float(os.environ.get('LEAF','0.25'))
 NOISE_SHARE=float(os.environ.get('NS','0.5'))
 _CLOSURE_STEPS: Final = 2
+_MOST_REFLECTED: Final = 0.995
+"""In an open scene no leaf may reflect more than this share of a unit field, whatever its links say."""
+
 _REFINE_SHARE: Final = 0.75
 """A round of refinement resolves at most this share of the squared error."""
 
@@ -258,10 +261,15 @@ class RadiositySolver:
         leaf: BoolArray = self._tree.child < 0
         self._closure = np.ones(len(self._tree))
         ones = np.ones((len(self._tree), 1))
+        highest = self._patch_reflectance.max(axis=1)[self._tree.patch]
+        limit = _MOST_REFLECTED / np.maximum(highest, 1e-300)
         for _ in range(_CLOSURE_STEPS):
             row_sum = self._operator(ones)[:, 0]
-            self._closure = rescale(self._closure, row_sum, leaf, self._closed)
+            closure = rescale(self._closure, row_sum, leaf, limit, self._closed)
             yield True
+            if np.array_equal(closure, self._closure):
+                break
+            self._closure = closure
 
     def _settle(self, target: float) -> Iterator[bool]:
         """Conjugate gradients until the unshot radiosity is below `target` of the radiosity, both RMS."""

@@ -16,14 +16,21 @@ import numpy as np
 
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.types import BoolArray, Corners, Float32Array, FloatArray, IntArray
+from solver.types import BoolArray, Corners, Float32Array, FloatArray, IntArray, ByteArray
 from solver.visibility.rays import RayScene
+from solver.visibility.sampling import hash_index, sample_by_solid_angle, sample_element
 
 STRATA: Final = 16
 """Quadrant pairs of a link."""
 
 STRATIFIED: Final = 0.5
 """Variance of a stratified sample relative to that of a random one."""
+
+NEAR: Final = 2.0
+"""Elements nearer than this many times their size are sampled by solid angle."""
+
+MISSED: Final = 0.2
+"""Part of a sample that may be of the other kind than all that were taken."""
 
 BATCH: Final = 1 << 17
 """Rays generated and traced at a time, which bounds memory."""
@@ -49,49 +56,39 @@ class VisibleFractions:
 
 
 @kernel
-def _hash(x: int) -> int:
-    h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x7F4A7C15)
-    h ^= h >> np.uint64(32)
-    h *= np.uint64(0xD6E8FEB86659FD93)
-    h ^= h >> np.uint64(32)
-    h *= np.uint64(0xD6E8FEB86659FD93)
-    h ^= h >> np.uint64(32)
-    return np.int64(h >> np.uint64(1))
+def _is_close(corners: FloatArray, count: int, other: FloatArray, other_count: int) -> bool:
+    """Whether two elements (4, 3) are closer than their size: the kernel varies much between them."""
+    x = y = z = 0.0
+    for k in range(count):
+        x += corners[k, 0] / count
+        y += corners[k, 1] / count
+        z += corners[k, 2] / count
+    for k in range(other_count):
+        x -= other[k, 0] / other_count
+        y -= other[k, 1] / other_count
+        z -= other[k, 2] / other_count
+    size = 0.0
+    for k in range(2):
+        for axis in range(3):
+            size += (corners[k, axis] - corners[k + 2, axis]) ** 2 + (other[k, axis] - other[k + 2, axis]) ** 2
+    return x * x + y * y + z * z < NEAR * NEAR * size
 
 
 @kernel
-def sample_element(
-    corners: FloatArray, count: int, normal: FloatArray, area: float, u: float, v: float, out: FloatArray
-) -> float:
-    """Point of an element (4, 3) at (u, v) in the unit square, into out (3,); returns its area weight.
-
-    The weight is the Jacobian of the map: over the unit square its mean is the element's area.
-    """
-    if count == 3:
-        r = math.sqrt(u)
-        a = 1.0 - r
-        b = r * (1.0 - v)
-        c = r * v
-        for axis in range(3):
-            out[axis] = a * corners[0, axis] + b * corners[1, axis] + c * corners[2, axis]
-        return area
-    sx = (1.0 - v) * (corners[1, 0] - corners[0, 0]) + v * (corners[2, 0] - corners[3, 0])
-    sy = (1.0 - v) * (corners[1, 1] - corners[0, 1]) + v * (corners[2, 1] - corners[3, 1])
-    sz = (1.0 - v) * (corners[1, 2] - corners[0, 2]) + v * (corners[2, 2] - corners[3, 2])
-    tx = (1.0 - u) * (corners[3, 0] - corners[0, 0]) + u * (corners[2, 0] - corners[1, 0])
-    ty = (1.0 - u) * (corners[3, 1] - corners[0, 1]) + u * (corners[2, 1] - corners[1, 1])
-    tz = (1.0 - u) * (corners[3, 2] - corners[0, 2]) + u * (corners[2, 2] - corners[1, 2])
-    wa = (1.0 - u) * (1.0 - v)
-    wb = u * (1.0 - v)
-    wc = u * v
-    wd = (1.0 - u) * v
+def _quadrant(corners: FloatArray, count: int, y: FloatArray) -> int:
+    """Which quadrant of an element (4, 3) a point of it is in: by the halves of two adjacent sides."""
+    along = 0.0
+    across = 0.0
+    last = count - 1
     for axis in range(3):
-        out[axis] = (
-            wa * corners[0, axis] + wb * corners[1, axis] + wc * corners[2, axis] + wd * corners[3, axis]
-        )
-    return (
-        (sy * tz - sz * ty) * normal[0] + (sz * tx - sx * tz) * normal[1] + (sx * ty - sy * tx) * normal[2]
-    )
+        du = corners[1, axis] - corners[0, axis] + (corners[2, axis] - corners[3, axis] if count == 4 else 0.0)
+        dv = corners[last, axis] - corners[0, axis] + (corners[2, axis] - corners[1, axis] if count == 4 else 0.0)
+        middle = 0.0
+        for k in range(count):
+            middle += corners[k, axis] / count
+        along += (y[axis] - middle) * du
+        across += (y[axis] - middle) * dv
+    return (1 if along > 0.0 else 0) + (2 if across > 0.0 else 0)
 
 
 @kernel
@@ -113,17 +110,22 @@ def _generate(
     origins: Float32Array,
     directions: Float32Array,
     weights: FloatArray,
+    strata: ByteArray,
 ) -> None:
     """Rays of links [start, stop); row 0 of the outputs belongs to link `first`."""
     x = np.empty(3)
     y = np.empty(3)
+    work = np.empty((8, 3))
     shift = np.empty(4)
     for link in range(start, stop):
-        i = p[link]
-        j = q[link]
+        # From the smaller end to the larger.
+        swapped = area[p[link]] > area[q[link]]
+        i = q[link] if swapped else p[link]
+        j = p[link] if swapped else q[link]
         n1 = normals[patch[i]]
         n2 = normals[patch[j]]
-        h = _hash(np.int64(i) * np.int64(1000003) + np.int64(j))
+        close = _is_close(corners[i], counts[i], corners[j], counts[j])
+        h = hash_index(np.int64(i) * np.int64(1000003) + np.int64(j))
         for axis in range(4):
             shift[axis] = ((h >> (15 * axis)) & 0x7FFF) / 32768.0
         ray = (link - first) * STRATA * samples
@@ -133,9 +135,13 @@ def _generate(
             v1 = 0.5 * (((stratum >> 1) & 1) + (shift[1] + (s + 1) * _STEP[1]) % 1.0)
             u2 = 0.5 * (((stratum >> 2) & 1) + (shift[2] + (s + 1) * _STEP[2]) % 1.0)
             v2 = 0.5 * (((stratum >> 3) & 1) + (shift[3] + (s + 1) * _STEP[3]) % 1.0)
-            weight = sample_element(corners[i], counts[i], n1, area[i], u1, v1, x) * sample_element(
-                corners[j], counts[j], n2, area[j], u2, v2, y
-            )
+            weight = sample_element(corners[i], counts[i], n1, area[i], u1, v1, x)
+            if close:
+                weight *= sample_by_solid_angle(corners[j], counts[j], n2, x, u2, v2, work, y)
+            else:
+                weight *= sample_element(corners[j], counts[j], n2, area[j], u2, v2, y)
+            near = stratum & 3
+            far = _quadrant(corners[j], counts[j], y) if close and weight > 0.0 else stratum >> 2
             square = 0.0
             cosine1 = 0.0
             cosine2 = 0.0
@@ -144,15 +150,22 @@ def _generate(
                 square += d * d
                 cosine1 += d * n1[axis]
                 cosine2 -= d * n2[axis]
-            if square > 0.0 and cosine1 > 0.0 and cosine2 > 0.0:
-                weights[ray] = weight * cosine1 * cosine2 / (math.pi * square * square)
+            if weight > 0.0 and square > 0.0 and cosine1 > 0.0 and cosine2 > 0.0:
+                weights[ray] = weight * (
+                    cosine1 / math.sqrt(square) if close else cosine1 * cosine2 / (square * square)
+                )
+                strata[ray] = near * 4 + far if swapped else far * 4 + near
+                for axis in range(3):
+                    a = np.float32((x[axis] - center[axis]) * scale + offset * n1[axis])
+                    b = np.float32((y[axis] - center[axis]) * scale + offset * n2[axis])
+                    origins[ray, axis] = a
+                    directions[ray, axis] = b - a
             else:
                 weights[ray] = 0.0
-            for axis in range(3):
-                a = np.float32((x[axis] - center[axis]) * scale + offset * n1[axis])
-                b = np.float32((y[axis] - center[axis]) * scale + offset * n2[axis])
-                origins[ray, axis] = a
-                directions[ray, axis] = b - a
+                strata[ray] = 0
+                for axis in range(3):
+                    origins[ray, axis] = 0.0
+                    directions[ray, axis] = 0.0
             ray += 1
 
 
@@ -162,20 +175,15 @@ def _reduce(
     first: int,
     start: int,
     stop: int,
-    exchange: FloatArray,
     weights: FloatArray,
+    strata: ByteArray,
     blocked: BoolArray,
     visibility: FloatArray,
     noise: FloatArray,
     spread_p: FloatArray,
     spread_q: FloatArray,
 ) -> None:
-    """Visible fraction, its squared error, and its squared deviation between the quadrants of either end.
-
-    The kernel of close pairs is peaked, and the ratio of sampled sums would be biased by the peaks that
-    few samples miss. The exchange area is known, so that the lesser of the visible and the blocked part
-    is measured in absolute terms, without bias, and the other is the rest.
-    """
+    """Visible fraction, its squared error, and its squared deviation between the quadrants of either end."""
     weight_p = np.empty(4)
     weight_q = np.empty(4)
     seen_p = np.empty(4)
@@ -188,48 +196,41 @@ def _reduce(
         seen_q[:] = 0.0
         base = (link - first) * n
         seen_square = 0.0
-        hidden_square = 0.0
-        for s in range(n):
-            w = weights[base + s]
-            a = (s % STRATA) & 3
-            b = (s % STRATA) >> 2
+        square = 0.0
+        for ray in range(base, base + n):
+            w = weights[ray]
+            a = strata[ray] & 3
+            b = strata[ray] >> 2
             weight_p[a] += w
             weight_q[b] += w
-            if blocked[base + s]:
-                hidden_square += w * w
-            else:
+            square += w * w
+            if not blocked[ray]:
                 seen_square += w * w
                 seen_p[a] += w
                 seen_q[b] += w
         total = weight_p.sum()
         seen = seen_p.sum()
-        scale = 1.0 / (n * exchange[link])
-        if 2.0 * seen <= total:
-            v = min(1.0, seen * scale)
-            square = seen_square
-            part = seen
-        else:
-            v = max(0.0, 1.0 - (total - seen) * scale)
-            square = hidden_square
-            part = total - seen
-        visibility[link] = v
-        # One sample of the other kind may have been missed.
-        missed = 0.5 / (n + 1.0)
-        scatter = max(0.0, square * n - part * part) * scale * scale / n
-        noise[link] = STRATIFIED * (scatter + missed * missed / n)
         spread_p[link] = 0.0
         spread_q[link] = 0.0
         if total <= 0.0:
+            visibility[link] = 0.5
+            noise[link] = 0.25
             continue
+        v = seen / total
+        visibility[link] = v
+        # Of a ratio of sums, to first order; and one sample of the other kind may have been missed.
+        scatter = ((1.0 - 2.0 * v) * seen_square + v * v * square) / (total * total)
+        effective = total * total / square
+        missed = MISSED / (effective + 1.0)
+        noise[link] = STRATIFIED * (max(0.0, scatter) + missed * missed)
         # Between-quadrant variance less what 4 samples a quadrant scatter by themselves, and at least
         # the error of the whole estimate.
-        ratio = seen / total
-        scattered = 0.75 * ratio * (1.0 - ratio) / (4.0 * samples)
+        scattered = 0.75 * v * (1.0 - v) * 4.0 / effective
         for k in range(4):
             if weight_p[k] > 0.0:
-                spread_p[link] += weight_p[k] / total * (seen_p[k] / weight_p[k] - ratio) ** 2
+                spread_p[link] += weight_p[k] / total * (seen_p[k] / weight_p[k] - v) ** 2
             if weight_q[k] > 0.0:
-                spread_q[link] += weight_q[k] / total * (seen_q[k] / weight_q[k] - ratio) ** 2
+                spread_q[link] += weight_q[k] / total * (seen_q[k] / weight_q[k] - v) ** 2
         spread_p[link] = max(spread_p[link] - scattered, 0.25 * scattered)
         spread_q[link] = max(spread_q[link] - scattered, 0.25 * scattered)
 
@@ -238,7 +239,6 @@ def visible_fractions(
     rays: RayScene,
     p: IntArray,
     q: IntArray,
-    exchange: FloatArray,
     corners: Corners,
     counts: IntArray,
     area: FloatArray,
@@ -246,9 +246,9 @@ def visible_fractions(
     normals: FloatArray,
     samples: int = 1,
 ) -> VisibleFractions:
-    """Visible fractions of element pairs p, q (n,) with unoccluded exchange areas (n,) > 0.
+    """Visible fractions of element pairs p, q (n,), of the light paths between them, by 16 `samples` rays each.
 
-    By 16 `samples` rays each. corners (m, 4, 3), counts (m,), area (m,), patch (m,) are the elements',
+    corners (m, 4, 3), counts (m,), area (m,), patch (m,) are the elements',
     normals (k, 3) the patches'.
     """
     n = len(p)
@@ -260,6 +260,7 @@ def visible_fractions(
         origins = np.empty((count, 3), dtype=np.float32)
         directions = np.empty((count, 3), dtype=np.float32)
         weights = np.empty(count)
+        strata = np.empty(count, dtype=np.uint8)
 
         def generate(
             start: int,
@@ -268,6 +269,7 @@ def visible_fractions(
             origins: Float32Array = origins,
             directions: Float32Array = directions,
             weights: FloatArray = weights,
+            strata: ByteArray = strata,
         ) -> None:
             _generate(
                 p,
@@ -287,6 +289,7 @@ def visible_fractions(
                 origins,
                 directions,
                 weights,
+                strata,
             )
 
         run_chunks(generate, last - first, _CHUNK)
@@ -296,8 +299,8 @@ def visible_fractions(
             first,
             first,
             last,
-            exchange,
             weights,
+            strata,
             blocked,
             result.visibility,
             result.noise,
