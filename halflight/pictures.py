@@ -99,11 +99,11 @@ class PathPicture:
     """A path-traced frame, traced until its noise is within the tolerance, or for a number of samples."""
 
     def __init__(self, scene: Scene, request: FrameRequest, tolerance: float, samples: int | None) -> None:
-        """With `samples` a pixel, whatever the noise; otherwise until it is within `tolerance`."""
+        """With at least `samples` a pixel, whatever the noise; otherwise until it is within `tolerance`."""
         world = World.of(scene)
-        per_pass = SAMPLES_PER_PASS if samples is None else min(samples, SAMPLES_PER_PASS)
+        passes = None if samples is None else -(-samples // SAMPLES_PER_PASS)
         tracer = PathTracer(world.surfaces, world.rays)
-        self._frame = tracer.frame(request.camera.resolve(scene), per_pass)
+        self._frame = tracer.frame(request.camera.resolve(scene), SAMPLES_PER_PASS, passes)
         self._tolerance = tolerance
         self._samples = samples
         self._error, self._error_passes = float("inf"), 0

@@ -176,9 +176,7 @@ def _trace() -> None:
     scene = _room(_RED, _WARM_LIGHT, range(5))
     world = World.of(scene)
     tracer = PathTracer(world.surfaces, world.rays)
-    frame = tracer.frame(scene.cameras["main"], 4)
-    while frame.passes < 2:
-        frame.step(0.0)
+    tracer.frame(scene.cameras["main"], passes=2).run()
     surfaces = world.surfaces
     tracer.irradiance(surfaces.corners[:2].mean(axis=1), surfaces.normal[:2], 32)
     patches = np.arange(surfaces.patch_count, dtype=np.int32)

@@ -17,14 +17,13 @@ class PathTracedFrame:
         self._estimate = estimate
         self._shape = (camera.height, camera.width, 3)
 
-    def step(self, budget: float) -> None:
-        """Work for about `budget` seconds of wall time on all cores."""
-        self._estimate.step(budget)
+    def step(self, budget: float) -> bool:
+        """Work for about `budget` seconds of wall time on all cores; True while more can be done."""
+        return self._estimate.step(budget)
 
-    def run(self, passes: int) -> None:
-        """Work until at least `passes` passes are complete."""
-        while self.passes < passes:
-            self._estimate.step(1.0)
+    def run(self) -> None:
+        """Work until all passes are done; only for a frame with a number of passes."""
+        self._estimate.run()
 
     @property
     def passes(self) -> int:

@@ -27,7 +27,7 @@ class Paths(NamedTuple):
     """(w,) number of the next vertex, 0 for the first that reflects"""
     stream: NDArray[np.uint64]
     """(w,)"""
-    index: NDArray[np.uint64]
+    sample: NDArray[np.uint64]
     """(w,) index of the sample in its stream"""
 
 
@@ -54,7 +54,7 @@ def allocate_paths(capacity: int) -> Paths:
         item=np.empty(capacity, dtype=np.int32),
         vertex=np.empty(capacity, dtype=np.int32),
         stream=np.empty(capacity, dtype=np.uint64),
-        index=np.empty(capacity, dtype=np.uint64),
+        sample=np.empty(capacity, dtype=np.uint64),
     )
 
 

@@ -46,6 +46,7 @@ class Source(Protocol):
         alive: int,
         shadows: ShadowRays,
         cast: int,
+        /,
     ) -> int:
         """Write paths [start, stop) of `batch` at rows from `alive` on, and their shadow rays from `cast`.
 
@@ -74,11 +75,11 @@ class CameraSource:
         batch: Batch,
         start: int,
         stop: int,
-        tables: ShadingTables,
-        emitters: Emitters,
+        _tables: ShadingTables,
+        _emitters: Emitters,
         paths: Paths,
         alive: int,
-        shadows: ShadowRays,
+        _shadows: ShadowRays,
         cast: int,
     ) -> int:
         """Write camera rays; they cast no shadow rays yet."""
@@ -185,7 +186,7 @@ def _begin_camera(
     paths: Paths,
     alive: int,
 ) -> None:
-    """Rays from `eye` through the film, whose top left is at `corner` and whose pixels span `across`, `down`."""
+    """Rays from `eye` through the film: its top left is at `corner`, its pixels span `across` and `down`."""
     for path in range(start, stop):
         row = alive + path - start
         local, index = path // samples, np.uint64(path % samples)
@@ -208,7 +209,7 @@ def _begin_camera(
         paths.item[row] = local
         paths.vertex[row] = 0
         paths.stream[row] = stream
-        paths.index[row] = index
+        paths.sample[row] = index
 
 
 @kernel

@@ -35,12 +35,12 @@ class PathTracer:
         self._seed = seed
         self._tables, self._emitters = build_tables(surfaces, rays)
 
-    def frame(self, camera: Camera, samples_per_pass: int = 4) -> PathTracedFrame:
-        """A frame to be stepped: nothing is traced yet.
+    def frame(self, camera: Camera, samples_per_pass: int = 4, passes: int | None = None) -> PathTracedFrame:
+        """A frame to be stepped: nothing is traced yet. Without `passes` it can go on for ever.
 
         `samples_per_pass` samples of a pixel are stratified together; powers of two serve best.
         """
-        return PathTracedFrame(camera, self._estimate(CameraSource(camera), samples_per_pass, None))
+        return PathTracedFrame(camera, self._estimate(CameraSource(camera), samples_per_pass, passes))
 
     def irradiance(
         self, positions: Points, normals: FloatArray, samples: int

@@ -97,7 +97,8 @@ def cast_shadow_ray(
     shadows.energy[row, 2] = blue * weight * tables.emission[patch, 2]
     shadows.item[row] = item
     # The row is kept if the point faces the receiver. No branch: see the top.
-    return row + ((leaving > 0.0) & (arriving > 0.0))
+    used: int = row + ((leaving > 0.0) & (arriving > 0.0))
+    return used
 
 
 @inline_kernel
@@ -128,7 +129,7 @@ def leave_vertex(
     paths.item[row] = item
     paths.vertex[row] = vertex + 1
     paths.stream[row] = stream
-    paths.index[row] = index
+    paths.sample[row] = index
 
 
 @kernel
@@ -166,7 +167,9 @@ def arrive(
         y = paths.origin[i, 1] + t * dy
         z = paths.origin[i, 2] + t * dz
         height = (
-            nx * (tables.anchor[hit, 0] - x) + ny * (tables.anchor[hit, 1] - y) + nz * (tables.anchor[hit, 2] - z)
+            nx * (tables.anchor[hit, 0] - x)
+            + ny * (tables.anchor[hit, 1] - y)
+            + nz * (tables.anchor[hit, 2] - z)
         ) + tables.offset
         x, y, z = x + height * nx, y + height * ny, z + height * nz
 
@@ -190,7 +193,7 @@ def arrive(
         red *= tables.reflectance[patch, 0]
         green *= tables.reflectance[patch, 1]
         blue *= tables.reflectance[patch, 2]
-        vertex, stream, index = paths.vertex[i], paths.stream[i], paths.index[i]
+        vertex, stream, index = paths.vertex[i], paths.stream[i], paths.sample[i]
         u, v = pair(stream, index, 2 * vertex + 1)
         cast = cast_shadow_ray(
             tables, emitters, shadows, cast, x, y, z, nx, ny, nz, red, green, blue, item, u, v
