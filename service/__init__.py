@@ -1,1 +1,1 @@
-"""The HTTP service: routes, wire schemas and session hosting. It translates, and decides nothing about light."""
+"""The HTTP service: routes, wire schemas, session hosting. It translates, and decides nothing about light."""

@@ -44,6 +44,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
     app.include_router(pages.router)
     for routes in (scenes, session_routes, edits, frames, probe, events, later):
         app.include_router(routes.router, prefix="/v1", dependencies=[Depends(require_token)])
+    app.include_router(later.sockets, prefix="/v1")
     describe(app)
     return app
 

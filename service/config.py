@@ -9,6 +9,7 @@ from pydantic import AliasChoices, Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from solver.document.limits import SceneLimits
+from solver.engine.requests import FrameLimits
 from solver.errors import LimitExceededError
 from solver.transport.settings import SolverSettings
 
@@ -38,7 +39,9 @@ class ServiceSettings(BaseSettings):
     )
     pool_size: int = Field(default=1, ge=0, le=64, description="Workers kept warm for the next sessions.")
     refill_delay: float = Field(
-        default=1.0, ge=0.0, description="Seconds that a new session has the cores to itself before the pool refills."
+        default=1.0,
+        ge=0.0,
+        description="Seconds that a new session has the cores to itself before the pool refills.",
     )
     idle_seconds: float = Field(
         default=1800.0, gt=0.0, description="A session that nobody has used for this long is ended."
@@ -47,7 +50,9 @@ class ServiceSettings(BaseSettings):
     max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
     max_polygons: _Count = Field(default=20_000, description="Faces of a scene.")
     max_vertices: _Count = Field(default=200_000, description="Vertices, or corners of faces, of a scene.")
-    max_elements: _Count = Field(default=2_000_000, description="Largest `max_elements` that a client may set.")
+    max_elements: _Count = Field(
+        default=2_000_000, description="Largest `max_elements` that a client may set."
+    )
     max_links: _Count = Field(default=30_000_000, description="Largest `max_links` that a client may set.")
     max_frame_width: _Count = Field(default=4096, description="Pixels across a frame.")
     max_frame_height: _Count = Field(default=4096, description="Pixels down a frame.")
@@ -61,6 +66,13 @@ class ServiceSettings(BaseSettings):
     def scene_limits(self) -> SceneLimits:
         """The largest scene."""
         return SceneLimits(self.max_polygons, self.max_vertices)
+
+    @property
+    def frame_limits(self) -> FrameLimits:
+        """The largest frame."""
+        return FrameLimits(
+            self.max_frame_width, self.max_frame_height, self.max_frame_pixels, self.max_samples
+        )
 
     @property
     def solver_defaults(self) -> SolverSettings:

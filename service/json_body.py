@@ -1,19 +1,25 @@
-"""Request bodies: of bounded size, JSON and nothing else, parsed without a way into the interpreter's limits.
+"""Request bodies: of bounded size, in JSON and nothing else.
 
-Numbers that are not finite parse here, so that the model can name the field that holds one.
+Numbers that are not finite parse here, so that the model can name the field that holds one. A name that
+occurs twice in an object is refused: which of the two was meant, nobody can tell.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Coroutine
+from typing import Any, Final
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
-from pydantic_core import from_json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import INVALID, LIMIT, UNSUPPORTED_MEDIA, ProblemError, respond
+
+_SURROGATE: Final = re.compile(rb"\\u[dD][89a-fA-F]")
+"""An escape that is half of a character, and needs its other half to be one."""
 
 
 class BodyLimit:
@@ -24,6 +30,7 @@ class BodyLimit:
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -58,15 +65,43 @@ class JsonRequest(Request):
     async def json(self) -> Any:
         """The parsed body. Raises ProblemError."""
         try:
-            return from_json(await self.body(), allow_inf_nan=True)
+            return parse_json(await self.body())
         except ValueError as error:
             raise ProblemError.of_field(INVALID, ["body"], f"not acceptable JSON: {error}") from None
+
+
+def parse_json(text: bytes) -> Any:
+    """What `text` says. Raises ValueError, whose message is fit for a client."""
+    try:
+        value = json.loads(text.decode("utf-8"), object_pairs_hook=_members, parse_int=_integer)
+        if _SURROGATE.search(text):
+            json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    except UnicodeDecodeError:
+        raise ValueError("it is not encoded in UTF-8") from None
+    except UnicodeEncodeError:
+        raise ValueError("an escape stands for half a character") from None
+    return value
+
+
+def _members(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members = dict(pairs)
+    if len(members) < len(pairs):
+        twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
+        raise ValueError(f"{twice[:80]!r} occurs twice in an object")
+    return members
+
+
+def _integer(digits: str) -> int | float:
+    """Beyond what a float holds exactly, and so any field of a document, a number is a float."""
+    return int(digits) if len(digits) < 20 else float(digits)
 
 
 class JsonRoute(APIRoute):
     """A route whose body, if it has one, is parsed by JsonRequest."""
 
-    def get_route_handler(self) -> Callable[[Request], Awaitable[Response]]:
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler that FastAPI calls."""
         handle = super().get_route_handler()
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.cancellation import ClientGoneError
 from service.hosting.messages import Refusal, RefusalKind
-from service.hosting.remote import WorkerGoneError
+from service.hosting.remote import RefusedError, WorkerGoneError
 from service.hosting.sessions import NoSuchSessionError, TooManySessionsError
 from solver.errors import LimitExceededError, SceneError
 
@@ -24,7 +25,9 @@ MEDIA_TYPE: Final = "application/problem+json"
 class FieldProblem(BaseModel):
     """What is wrong with one field of the input."""
 
-    loc: list[str | int] = Field(description="Path of the field, from `body`, `query`, `path` or `header` on.")
+    loc: list[str | int] = Field(
+        description="Path of the field, from `body`, `query`, `path` or `header` on."
+    )
     msg: str
 
 
@@ -76,6 +79,19 @@ _PLAIN: Final = {
     405: "{method} is not something to do to {path}",
 }
 """Details of errors that the router raises, by their status."""
+
+_TITLES: Final = {
+    401: UNAUTHORIZED.title,
+    404: NO_SUCH_SESSION.title,
+    406: NOT_ACCEPTABLE.title,
+    409: CONFLICT.title,
+    413: LIMIT.title,
+    415: UNSUPPORTED_MEDIA.title,
+    422: INVALID.title,
+    429: TOO_MANY_SESSIONS.title,
+    501: NOT_AVAILABLE.title,
+    503: "The session's worker is gone, or this machine cannot draw frames",
+}
 
 MAX_ERRORS: Final = 20
 """Fields told of one bad input."""
@@ -129,6 +145,15 @@ def respond(
     return JSONResponse(problem.model_dump(exclude_none=True), kind.status, headers, MEDIA_TYPE)
 
 
+def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """What the API's description says of the problems that a call may meet."""
+    schema = {"$ref": "#/components/schemas/Problem"}
+    return {
+        status: {"description": _TITLES[status], "content": {MEDIA_TYPE: {"schema": schema}}}
+        for status in statuses
+    }
+
+
 def install(app: FastAPI) -> None:
     """Have every error of `app` told as a problem."""
 
@@ -148,6 +173,11 @@ def install(app: FastAPI) -> None:
         ]
         return respond(INVALID, _tell(fields), fields)
 
+    @app.exception_handler(RefusedError)
+    async def of_refusal(request: Request, error: RefusedError) -> JSONResponse:
+        told = ProblemError.of_refusal(error.refusal, "query" if request.method == "GET" else "body")
+        return respond(told.kind, told.detail, told.errors)
+
     @app.exception_handler(LimitExceededError)
     async def of_limit(_: Request, error: LimitExceededError) -> JSONResponse:
         return respond(LIMIT, str(error))
@@ -163,6 +193,10 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(WorkerGoneError)
     async def of_worker(_: Request, error: WorkerGoneError) -> JSONResponse:
         return respond(WORKER_GONE, str(error))
+
+    @app.exception_handler(ClientGoneError)
+    async def of_nobody(_: Request, __: ClientGoneError) -> Response:
+        return Response(status_code=499)
 
     @app.exception_handler(Exception)
     async def of_anything(_: Request, __: Exception) -> JSONResponse:

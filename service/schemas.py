@@ -36,16 +36,19 @@ class SessionStatus(BaseModel):
     name: str = Field(description="The scene's name.")
     revision: int = Field(description="Counts the edit batches: 1 for the scene as it was posted.")
     state: SessionState = Field(
-        description="`converged` only when `error_estimate` is within `settings.error_tolerance` and nothing is "
-        "left to redistribute; `paused` when a limit of the settings was reached before, and a warning says which."
+        description="`converged` only when `error_estimate` is within `settings.error_tolerance` and nothing "
+        "is left to redistribute; `paused` when a limit of the settings was reached before, and a warning "
+        "says which."
     )
     progress: float = Field(ge=0.0, le=1.0)
     error_estimate: float = Field(
         ge=0.0,
-        description="Estimated relative error of the radiosity field against the exact solution of the scene.",
+        description="Estimated relative error of the radiosity field against the scene's exact solution.",
     )
-    unshot_fraction: float = Field(ge=0.0, description="Share of the radiosity that is received and not passed on.")
-    statistics: dict[str, int | float] = Field(
+    unshot_fraction: float = Field(
+        ge=0.0, description="Share of the radiosity that is received and not passed on."
+    )
+    statistics: dict[str, bool | int | float] = Field(
         description="Counts: `polygons`, `elements`, `links`, and more.",
         examples=[{"polygons": 16, "elements": 2412, "links": 30117}],
     )
@@ -150,7 +153,9 @@ class ProbePoint(Closed):
     """A point and the direction that it faces."""
 
     position: Point = Field(description="Metres.")
-    normal: Direction = Field(description="Of any length but 0. The point receives light from the side that it points to.")
+    normal: Direction = Field(
+        description="Of any length but 0. The point receives light from the side that it points to."
+    )
 
 
 class ProbeRequest(Closed):

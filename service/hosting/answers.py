@@ -6,6 +6,7 @@ import hashlib
 from typing import Final
 
 from service.hosting.messages import (
+    AnyRequest,
     ApplyEdits,
     Configure,
     EditsAnswer,
@@ -16,9 +17,9 @@ from service.hosting.messages import (
     Probe,
     Refusal,
     RefusalKind,
-    Request,
     SceneAnswer,
 )
+from solver.engine.drawing import encode
 from solver.engine.engine import Engine
 from solver.engine.requests import NotAvailableError
 from solver.engine.views import Outlook
@@ -34,15 +35,15 @@ REFUSED: Final = (SolverError, MemoryError)
 """What an engine raises on purpose, having changed nothing."""
 
 
-def answer(engine: Engine, request: Request[object]) -> object:
+def answer(engine: Engine, request: AnyRequest) -> object:
     """Put a request to the engine. Raises one of REFUSED."""
     match request:
         case GetStatus():
             return engine.status()
         case GetScene():
             return SceneAnswer(engine.revision, engine.scene)
-        case Configure(changes):
-            engine.configure(changes.changes_to(engine.settings))
+        case Configure(wanted):
+            engine.configure(wanted.changes_to(engine.settings))
             return engine.status()
         case ApplyEdits(edits, if_revision):
             changes = engine.apply(edits, if_revision)
@@ -60,7 +61,8 @@ def answer_frame(engine: Engine, request: GetFrame) -> FrameAnswer:
     if tag in request.known_tags:
         return FrameAnswer(None, tag, outlook, 0.0)
     frame = engine.frame(request.frame)
-    return FrameAnswer(encode(frame.image, request.frame.layer, request.encoding), tag, frame.outlook, frame.seconds)
+    content = encode(frame.image, request.frame.layer, request.encoding)
+    return FrameAnswer(content, _tag(frame.outlook, request), frame.outlook, frame.seconds)
 
 
 def _tag(outlook: Outlook, request: GetFrame) -> str:

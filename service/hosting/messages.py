@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from solver.document.edits import Edit
 from solver.document.fields import Location
 from solver.document.limits import SceneLimits
 from solver.document.settings import SettingsDocument
-from solver.engine.requests import Encoding, FrameRequest, Wait
+from solver.engine.requests import Encoding, FrameLimits, FrameRequest, Wait
 from solver.engine.status import Change, EngineStatus, ProbeResult
 from solver.engine.views import Outlook
 from solver.geometry.scene import Scene
@@ -28,6 +28,9 @@ class Request(Generic[R]):
     """A request that is answered with an R."""
 
 
+AnyRequest: TypeAlias = Request[Any]
+
+
 @dataclass(frozen=True)
 class Open(Request[EngineStatus]):
     """Make the worker's engine. Its first request."""
@@ -35,6 +38,7 @@ class Open(Request[EngineStatus]):
     scene: Scene
     settings: SolverSettings
     limits: SceneLimits
+    frame_limits: FrameLimits
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ class Call:
     """To the worker: answer a request."""
 
     number: int
-    request: Request[object]
+    request: AnyRequest
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import logging
 from collections import deque
 from collections.abc import Callable
 
-from service.hosting.remote import RemoteWorker, WorkerGoneError
+from service.hosting.remote import RemoteWorker, WorkerNotStartedError
 
 _log = logging.getLogger(__name__)
 
@@ -31,12 +31,12 @@ class WorkerPool:
         return len(self._stock)
 
     async def fill(self) -> None:
-        """Start workers until the stock is complete. Raises WorkerGoneError where one does not start."""
+        """Start workers until the stock is complete. Raises WorkerNotStartedError."""
         while len(self._stock) < self._size and not self._closed:
             self._stock.append(await RemoteWorker.start(self._on_lost))
 
     async def take(self) -> RemoteWorker:
-        """A worker, warm from the stock or newly started. Raises WorkerGoneError where none starts."""
+        """A worker, warm from the stock or newly started. Raises WorkerNotStartedError where none starts."""
         self._refill_later()
         while self._stock:
             worker = self._stock.popleft()
@@ -66,5 +66,5 @@ class WorkerPool:
         await asyncio.sleep(self._delay)
         try:
             await self.fill()
-        except WorkerGoneError:
+        except WorkerNotStartedError:
             _log.error("a worker for the pool did not start")

@@ -30,6 +30,13 @@ class WorkerGoneError(Exception):
         super().__init__("the worker process of this session has ended; delete the session and post it anew")
 
 
+class WorkerNotStartedError(WorkerGoneError):
+    """A worker has ended before it could take a session."""
+
+    def __str__(self) -> str:
+        return "a worker process could not be started; the service's own log says why"
+
+
 class RefusedError(Exception):
     """A worker refused a request."""
 
@@ -41,9 +48,7 @@ class RefusedError(Exception):
 class RemoteWorker:
     """One worker process, from its start to its end."""
 
-    def __init__(
-        self, process: subprocess.Popen[bytes], end: WebEnd, on_lost: Callable[[], None]
-    ) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], end: WebEnd, on_lost: Callable[[], None]) -> None:
         self._process = process
         self._end = end
         self._on_lost = on_lost
@@ -61,7 +66,7 @@ class RemoteWorker:
 
     @classmethod
     async def start(cls, on_lost: Callable[[], None]) -> RemoteWorker:
-        """Start a process and wait until it is warm. Raises WorkerGoneError where it does not get there.
+        """Start a process and wait until it is warm. Raises WorkerNotStartedError where it does not.
 
         `on_lost` is called when the process ends without having been closed.
         """
@@ -72,7 +77,7 @@ class RemoteWorker:
         try:
             ready = await worker._end.receive()
             if not isinstance(ready, Ready):
-                raise WorkerGoneError
+                raise WorkerNotStartedError
         except BaseException:
             await worker.close()
             raise

@@ -12,9 +12,6 @@ from typing import Final
 from service.hosting.messages import Open
 from service.hosting.pool import WorkerPool
 from service.hosting.remote import RefusedError, RemoteWorker
-from solver.document.limits import SceneLimits
-from solver.geometry.scene import Scene
-from solver.transport.settings import SolverSettings
 
 _LONGEST_NAP: Final = 30.0
 """Seconds between two looks for idle sessions, at most."""
@@ -84,7 +81,7 @@ class Sessions:
             raise NoSuchSessionError(session_id)
         return found
 
-    async def open(self, scene: Scene, settings: SolverSettings, limits: SceneLimits) -> Session:
+    async def open(self, request: Open) -> Session:
         """A new session, solving. Raises TooManySessionsError, RefusedError, WorkerGoneError."""
         if len(self._by_id) + self._opening >= self._limit:
             raise TooManySessionsError(self._limit)
@@ -92,7 +89,7 @@ class Sessions:
         try:
             worker = await self._pool.take()
             try:
-                await worker.call(Open(scene, settings, limits))
+                await worker.call(request)
             except RefusedError:
                 self._pool.give_back(worker)
                 raise

@@ -21,13 +21,13 @@ from service.hosting.answers import REFUSED, answer, answer_frame, refusal_of
 from service.hosting.messages import (
     Abandon,
     Answer,
+    AnyRequest,
     Call,
     FrameAnswer,
     GetFrame,
     Open,
     Ready,
     Refusal,
-    Request,
     StatusChanged,
     ToWorker,
 )
@@ -73,6 +73,8 @@ class Host:
             if self._engine is not None:
                 self._serve_waiting(self._engine)
                 self._work(self._engine)
+                if not self._busy:
+                    self._serve_waiting(self._engine)  # nothing will get better while this sleeps
 
     def _arrived(self) -> list[ToWorker]:
         """What has come; where there is nothing else to do, this waits for it."""
@@ -102,12 +104,14 @@ class Host:
                 self._report()
                 self._end.send(Answer(number, value))
 
-    def _answer(self, request: Request[object]) -> object:
+    def _answer(self, request: AnyRequest) -> object:
         try:
             if self._engine is not None:
                 return answer(self._engine, request)
             if isinstance(request, Open):
-                self._engine = Engine(request.scene, request.settings, request.limits, self._drawing)
+                self._engine = Engine(
+                    request.scene, request.settings, request.limits, self._drawing, request.frame_limits
+                )
                 return self._engine.status()
             raise TypeError(f"{type(request).__name__} came before Open")
         except REFUSED as error:
@@ -152,8 +156,9 @@ def _read(end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker]) -> None:
 
 def main(descriptor: int) -> None:
     """Run a worker on the socket of that file descriptor."""
-    # An interrupt from the terminal goes to all processes; the web process decides what to make of it.
+    # Terminals and supervisors signal all processes; the web process decides what to make of it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     end = WorkerEnd(socket.socket(fileno=descriptor))
     inbox: queue.SimpleQueue[ToWorker] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(end, inbox), name="halflight-reader", daemon=True).start()

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from service.context import UsedSession
+from service.hosting.remote import WorkerGoneError
+from service.hosting.sessions import Session
 from service.problems import responses
 from service.schemas import SessionStatus
 
 router = APIRouter(tags=["sessions"])
 
 
-@router.get(
-    "/sessions/{id}/events", response_class=EventSourceResponse, responses=responses(404, 503)
-)
-async def session_events(session: UsedSession) -> AsyncIterator[ServerSentEvent]:
+def living(session: UsedSession) -> Session:
+    """The session that the path names. Raises WorkerGoneError where its worker has ended."""
+    if session.worker.gone:
+        raise WorkerGoneError
+    return session
+
+
+@router.get("/sessions/{id}/events", response_class=EventSourceResponse, responses=responses(404, 503))
+async def session_events(session: Annotated[Session, Depends(living)]) -> AsyncIterator[ServerSentEvent]:
     """Every change of status, as events `status` whose data is the status; the first at once.
 
     Where changes come faster than the client reads, it gets the latest. The stream ends with an event
@@ -26,10 +34,9 @@ async def session_events(session: UsedSession) -> AsyncIterator[ServerSentEvent]
     worker = session.worker
     told = None
     while not worker.gone:
-        news = worker.news()
         if worker.status is not None and worker.status is not told:
             told = worker.status
-            yield ServerSentEvent(SessionStatus.of(session.id, told), event="status", id=str(told.revision))
+            yield ServerSentEvent(data=SessionStatus.of(session.id, told), event="status")
         else:
             await worker.news()
-    yield ServerSentEvent(event="end", raw_data="{}")
+    yield ServerSentEvent(data={}, event="end")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from fastapi import APIRouter, Request, Response
 
-from service.context import Context, Ctx, UsedSession
-from service.hosting.messages import Configure, GetScene, GetStatus, Refusal
-from service.hosting.remote import RefusedError
+from service.context import Ctx, UsedSession
+from service.hosting.messages import Configure, GetScene, GetStatus, Open
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
 from service.schemas import SceneAnswer, SessionList, SessionRequest, SessionStatus
 from solver.document.conversion import document_of, scene_of
+from solver.document.limits import SceneLimits
+from solver.document.models import SceneDocument
 from solver.document.samples import load_sample
 from solver.document.settings import SettingsDocument
 from solver.errors import SceneError
@@ -20,23 +23,30 @@ router = APIRouter(tags=["sessions"], route_class=JsonRoute)
 
 
 @router.post("/sessions", status_code=201, responses=responses(413, 422, 429, 503))
-async def open_session(body: SessionRequest, request: Request, response: Response, context: Ctx) -> SessionStatus:
+async def open_session(
+    body: SessionRequest, request: Request, response: Response, context: Ctx
+) -> SessionStatus:
     """Open a session on a scene. The solve starts at once."""
-    settings = body.settings.changes_to(context.settings.solver_defaults)
-    context.settings.check_solver(settings)
-    scene = _scene(body)
-    context.settings.scene_limits.check(scene)
-    session = await context.sessions.open(scene, settings, context.settings.scene_limits)
+    limits = context.settings
+    settings = body.settings.changes_to(limits.solver_defaults)
+    limits.check_solver(settings)
+    scene = await asyncio.to_thread(_scene, body, limits.scene_limits)
+    opening = Open(scene, settings, limits.scene_limits, limits.frame_limits)
+    session = await context.sessions.open(opening)
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
     return SessionStatus.of(session.id, await session.worker.call(GetStatus()))
 
 
-def _scene(body: SessionRequest) -> Scene:
+def _scene(body: SessionRequest, limits: SceneLimits) -> Scene:
     if (body.scene is None) == (body.sample is None):
         raise ProblemError.of_field(INVALID, ["body", "scene"], "give either a scene or the name of a sample")
     try:
-        return load_sample(body.sample) if body.scene is None else scene_of(body.scene)
+        if body.sample is not None:
+            return load_sample(body.sample)
+        document = body.scene or SceneDocument()
+        limits.check_document(document)
+        return scene_of(document)
     except SceneError as error:
         raise ProblemError.of_scene(error, ["body"] if body.scene is None else ["body", "scene"]) from None
 
@@ -46,9 +56,9 @@ async def list_sessions(context: Ctx) -> SessionList:
     """The sessions that the service holds."""
     return SessionList(
         sessions=[
-            SessionStatus.of(session.id, session.worker.status)
+            SessionStatus.of(session.id, status)
             for session in context.sessions
-            if session.worker.status is not None
+            if (status := session.worker.status) is not None
         ]
     )
 
@@ -65,9 +75,7 @@ async def end_session(id: str, context: Ctx) -> None:
     await context.sessions.end(id)
 
 
-@router.get(
-    "/sessions/{id}/scene", response_model_exclude_unset=True, responses=responses(404, 503)
-)
+@router.get("/sessions/{id}/scene", response_model_exclude_unset=True, responses=responses(404, 503))
 async def session_scene(session: UsedSession) -> SceneAnswer:
     """The scene as it stands. Posted back, it gives an equal session."""
     answer = await session.worker.call(GetScene())

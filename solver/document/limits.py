@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from solver.document.models import SceneDocument
 from solver.errors import LimitExceededError
 from solver.geometry.scene import Scene
 
@@ -19,8 +21,15 @@ class SceneLimits:
 
     def check(self, scene: Scene) -> None:
         """Raise LimitExceededError where `scene` is larger."""
-        polygons = sum(len(o.mesh.faces) for o in scene)
-        vertices = sum(max(len(o.mesh.vertices), sum(map(len, o.mesh.faces))) for o in scene)
+        self._check([(len(o.mesh.vertices), o.mesh.faces) for o in scene])
+
+    def check_document(self, document: SceneDocument) -> None:
+        """Raise LimitExceededError where `document` is larger, before anything is computed from it."""
+        self._check([(len(o.mesh.vertices), o.mesh.faces) for o in document.objects])
+
+    def _check(self, meshes: Sequence[tuple[int, Sequence[Sequence[int]]]]) -> None:
+        polygons = sum(len(faces) for _, faces in meshes)
+        vertices = sum(max(count, sum(map(len, faces))) for count, faces in meshes)
         if polygons > self.max_polygons:
             raise LimitExceededError("polygons", polygons, self.max_polygons)
         if vertices > self.max_vertices:

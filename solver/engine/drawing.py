@@ -1,0 +1,102 @@
+"""Pictures of a radiosity field: which renderers and layers there are, and what is kept between frames.
+
+The tessellation of a scene outlives its fields, and the mesh of a field outlives its frames, so that a
+camera that moves over a settled solution costs one pass of the GL and nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from solver.engine.requests import Encoding, LayerName, NotAvailableError, RendererName
+from solver.engine.world import World
+from solver.errors import RenderingUnavailableError
+from solver.geometry.scene import Camera
+from solver.rendering.device import GlDevice
+from solver.rendering.encoding import PictureFormat, encode_linear, encode_picture
+from solver.rendering.layers import picture_of
+from solver.rendering.renderer import FrameRenderer, Layer, Shading
+from solver.rendering.tessellation import RenderMesh, Tessellator
+from solver.rendering.tone_mapping import tone_map
+from solver.transport.field import RadiosityField
+from solver.types import AnyArray
+
+BEST_RENDERER: Final = RendererName.GOURAUD
+"""What draws a frame whose renderer is not named."""
+
+_SHADINGS: Final = {RendererName.FLAT: Shading.FLAT, RendererName.GOURAUD: Shading.GOURAUD}
+_LAYERS: Final = {LayerName(layer.value): layer for layer in Layer}
+
+
+class Drawing:
+    """Draws fields, in the thread that made it. Where there is no OpenGL, it says so when asked to draw."""
+
+    def __init__(self) -> None:
+        self._renderer: FrameRenderer | None = None
+        self._unavailable: RenderingUnavailableError | None = None
+        self._tessellator: Tessellator | None = None
+        self._mesh: RenderMesh | None = None
+        try:
+            self._renderer = FrameRenderer(GlDevice())
+        except RenderingUnavailableError as error:
+            self._unavailable = error
+
+    @property
+    def problem(self) -> str | None:
+        """Why frames cannot be drawn here; None where they can."""
+        return None if self._unavailable is None else str(self._unavailable)
+
+    def require(self, renderer: RendererName, layer: LayerName) -> None:
+        """Raise NotAvailableError where this version has no such renderer or layer."""
+        if renderer not in _SHADINGS:
+            raise NotAvailableError("renderer", renderer, (*_SHADINGS, RendererName.PATH))
+        if layer not in _LAYERS:
+            raise NotAvailableError("layer", layer, tuple(_LAYERS))
+
+    def draw(
+        self,
+        world: World,
+        field: RadiosityField,
+        camera: Camera,
+        renderer: RendererName,
+        layer: LayerName,
+        samples: int,
+    ) -> AnyArray:
+        """A layer of `field` as `camera` sees it, (height, width, ...), top row first.
+
+        Radiance in W/(m2 sr), irradiance in W/m2, illuminance in lux, depth and position in metres.
+        Raises NotAvailableError, RenderingUnavailableError.
+        """
+        self.require(renderer, layer)
+        if self._renderer is None:
+            # A new error, so that no traceback grows on the one that is kept.
+            raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
+        mesh = self._mesh_of(world, field)
+        image = self._renderer.draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples)
+        return world.scene.luminous_efficacy * image if layer is LayerName.ILLUMINANCE else image
+
+    def _mesh_of(self, world: World, field: RadiosityField) -> RenderMesh:
+        if self._tessellator is None or self._tessellator.surfaces is not world.surfaces:
+            self._tessellator, self._mesh = Tessellator(world.surfaces), None
+        if self._mesh is None or self._mesh.field is not field:
+            self._mesh = self._tessellator.mesh(field)
+        return self._mesh
+
+
+def encode(image: AnyArray, layer: LayerName, encoding: Encoding) -> bytes:
+    """The file of an image of `layer`.
+
+    Pictures show radiance tone-mapped, and other layers as `solver.rendering.layers` says. Linear files
+    hold the layer's own numbers, float32 in three channels; a layer of one number a pixel has it in each.
+    """
+    if isinstance(encoding.format, PictureFormat):
+        if layer is LayerName.RADIANCE:
+            picture = tone_map(image, encoding.exposure, encoding.tone_map)
+        else:
+            picture = picture_of(image, _LAYERS[layer])
+        return encode_picture(picture, encoding.format)
+    numbers = image[:, :, None] if image.ndim == 2 else image
+    shape = (*numbers.shape[:2], 3)
+    return encode_linear(np.ascontiguousarray(np.broadcast_to(numbers, shape), np.float32), encoding.format)

@@ -16,7 +16,7 @@ from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
 from solver.engine.drawing import BEST_RENDERER, Drawing
 from solver.engine.paths import PathFrames
-from solver.engine.requests import FrameRequest, LayerName, NotAvailableError, RendererName
+from solver.engine.requests import FrameLimits, FrameRequest, LayerName, NotAvailableError, RendererName
 from solver.engine.solution import Solution
 from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
 from solver.engine.views import Frame, Outlook, PathView, SolutionView, View
@@ -36,6 +36,7 @@ class Engine:
         settings: SolverSettings | None = None,
         limits: SceneLimits | None = None,
         drawing: Drawing | None = None,
+        frame_limits: FrameLimits | None = None,
     ) -> None:
         """Take `scene` as revision 1. `drawing` makes the frames, and may be shared by engines of one thread.
 
@@ -43,6 +44,7 @@ class Engine:
         """
         self._limits = limits or SceneLimits()
         self._limits.check(scene)
+        self._frame_limits = frame_limits or FrameLimits()
         self._settings = settings or SolverSettings()
         self._drawing = drawing or Drawing()
         self._revision = 1
@@ -111,13 +113,13 @@ class Engine:
         )
 
     def outlook(self, request: FrameRequest) -> Outlook:
-        """What a frame drawn now would be. Raises NotAvailableError, SceneError."""
+        """What a frame drawn now would be. Raises NotAvailableError, SceneError, LimitExceededError."""
         return self._outlook(request, self._view(request))
 
     def frame(self, request: FrameRequest) -> Frame:
         """The frame as well as it can be drawn now.
 
-        Raises NotAvailableError, SceneError, RenderingUnavailableError.
+        Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
         """
         view = self._view(request)
         start = time.perf_counter()
@@ -144,6 +146,7 @@ class Engine:
     def _view(self, request: FrameRequest) -> View:
         renderer = _renderer_of(request)
         camera = request.camera.resolve(self.scene)
+        self._frame_limits.check(camera, request.samples)
         if renderer is RendererName.PATH:
             if request.layer is not LayerName.RADIANCE:
                 raise NotAvailableError("layer of the path renderer", request.layer, (LayerName.RADIANCE,))

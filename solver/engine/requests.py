@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
 
 import numpy as np
 
 from solver.document.conversion import DEFAULT_CAMERA, is_parallel, up_of
-from solver.errors import SolverError, UnknownCameraError
+from solver.errors import LimitExceededError, SolverError, UnknownCameraError
 from solver.geometry.scene import Camera, Scene
+from solver.rendering.encoding import LinearFormat, PictureFormat
+from solver.rendering.tone_mapping import ToneCurve
 
 
 class NotAvailableError(SolverError):
@@ -71,7 +72,8 @@ class CameraChoice:
         """The camera. Raises UnknownCameraError, or SceneError where it has no direction to look in."""
         name = self.name
         if name is None:
-            name = DEFAULT_CAMERA if DEFAULT_CAMERA in scene.cameras else next(iter(scene.cameras), DEFAULT_CAMERA)
+            first = next(iter(scene.cameras), DEFAULT_CAMERA)
+            name = DEFAULT_CAMERA if DEFAULT_CAMERA in scene.cameras else first
         base = scene.cameras.get(name)
         if base is None:
             raise UnknownCameraError(name, tuple(scene.cameras))
@@ -100,6 +102,39 @@ class FrameRequest:
     layer: LayerName = LayerName.RADIANCE
     samples: int = 1
     """Samples of a pixel, for antialiasing."""
+
+
+@dataclass(frozen=True)
+class FrameLimits:
+    """The largest frame that is drawn."""
+
+    max_width: int = 16_384
+    max_height: int = 16_384
+    max_pixels: int = 2**26
+    max_samples: int = 4096
+    """Samples of a pixel"""
+
+    def check(self, camera: Camera, samples: int) -> None:
+        """Raise LimitExceededError where a frame of `camera` is larger."""
+        for what, value, limit in (
+            ("width", camera.width, self.max_width),
+            ("height", camera.height, self.max_height),
+            ("pixels", camera.width * camera.height, self.max_pixels),
+            ("samples", samples, self.max_samples),
+        ):
+            if value > limit:
+                raise LimitExceededError(what, value, limit)
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How a frame is turned into a file."""
+
+    format: PictureFormat | LinearFormat = PictureFormat.PNG
+    exposure: float | None = None
+    """Stops; None: so that the picture is neither dark nor pale. Only pictures of radiance heed it."""
+    tone_map: ToneCurve = ToneCurve.FILMIC
+    """Only pictures of radiance heed it."""
 
 
 class WaitFor(StrEnum):

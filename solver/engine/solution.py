@@ -19,11 +19,11 @@ class Solution:
     """A radiosity solver, what it has come to, and the error that stopped it, if one did."""
 
     def __init__(self, world: World, settings: SolverSettings, warm_start: Solution | None = None) -> None:
-        """Begin where `warm_start`, the solution of an earlier revision, has got to."""
+        """Begin where `warm_start`, the solution of an earlier revision, has got to, unless it failed."""
         self.world = world
-        self.solver = RadiositySolver(
-            world.surfaces, world.rays, settings, None if warm_start is None else warm_start.solver
-        )
+        usable = warm_start is not None and warm_start.state is not SessionState.FAILED
+        earlier = warm_start.solver if warm_start is not None and usable else None
+        self.solver: RadiositySolver = RadiositySolver(world.surfaces, world.rays, settings, earlier)
         self._failure: SolverError | MemoryError | None = None
         self._field: RadiosityField | None = None
         self._field_version = -1
@@ -77,7 +77,9 @@ class Solution:
         return self._field
 
     def power_by_object(self) -> dict[ObjectId, float]:
-        """W of luminance that leave the surfaces of each object."""
+        """W of luminance that leave the surfaces of each object; none is known of a failed solution."""
+        if self.state is SessionState.FAILED:
+            return {}
         field, surfaces = self.field(), self.world.surfaces
         leaving = field.area * (field.radiosity @ LUMINANCE_WEIGHTS)
         total = np.bincount(surfaces.object[field.patch], leaving, len(surfaces.object_ids))

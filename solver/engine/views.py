@@ -118,7 +118,9 @@ class SolutionView:
     def draw(self) -> AnyArray:
         """The picture. Raises RenderingUnavailableError."""
         world = self.solution.world
-        return self.drawing.draw(world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples)
+        return self.drawing.draw(
+            world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,55 @@
+"""What HTTP's headers of a frame request say: the formats that a client accepts, the frames that it has."""
+
+from __future__ import annotations
+
+import re
+from typing import Final, TypeAlias
+
+from service.problems import NOT_ACCEPTABLE, ProblemError
+from solver.rendering.encoding import LinearFormat, PictureFormat
+
+FrameFormat: TypeAlias = PictureFormat | LinearFormat
+
+MEDIA_TYPES: Final[dict[FrameFormat, str]] = {
+    PictureFormat.PNG: "image/png",
+    PictureFormat.JPEG: "image/jpeg",
+    PictureFormat.WEBP: "image/webp",
+    LinearFormat.EXR: "image/x-exr",
+    LinearFormat.HDR: "image/vnd.radiance",
+    LinearFormat.NPY: "application/x-npy",
+}
+"""In the order of preference where a client accepts several alike."""
+
+_QUALITY: Final = re.compile(r"q=(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
+_TAG: Final = re.compile(r'(?:W/)?"([^"]*)"')
+
+
+def choose_format(accept: str) -> FrameFormat:
+    """The format that an Accept header (RFC 9110, 12.5.1) likes best. Raises ProblemError if none is."""
+    ranges = _ranges(accept or "*/*")
+    qualities = {chosen: _quality(media, ranges) for chosen, media in MEDIA_TYPES.items()}
+    best = max(qualities, key=lambda chosen: qualities[chosen])
+    if qualities[best] == 0.0:
+        raise ProblemError(NOT_ACCEPTABLE, f"a frame can be had as {', '.join(MEDIA_TYPES.values())}")
+    return best
+
+
+def known_tags(if_none_match: str) -> frozenset[str]:
+    """The entity tags of an If-None-Match header."""
+    return frozenset(_TAG.findall(if_none_match))
+
+
+def _ranges(accept: str) -> dict[str, float]:
+    """Media ranges and their qualities; parameters other than q are of no account."""
+    ranges = {}
+    for entry in accept.split(","):
+        media, *parameters = (part.strip().lower() for part in entry.split(";"))
+        found = [match[1] for part in parameters if (match := _QUALITY.fullmatch(part))]
+        ranges[media] = float(found[0]) if found else 1.0
+    return ranges
+
+
+def _quality(media: str, ranges: dict[str, float]) -> float:
+    """By the most specific range that names the media type."""
+    kind = f"{media.partition('/')[0]}/*"
+    return next((ranges[name] for name in (media, kind, "*/*") if name in ranges), 0.0)

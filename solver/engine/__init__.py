@@ -1,0 +1,1 @@
+"""One session's state machine: edits in, time-sliced work, frames out."""
