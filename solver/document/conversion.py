@@ -134,7 +134,7 @@ def is_parallel(a: Vector, b: Vector) -> bool:
 
 
 def document_of(scene: Scene) -> SceneDocument:
-    """The document of `scene`: posted back, it gives an equal scene, to the last bit."""
+    """The document of `scene`: the fields that are set, posted back, give an equal scene, to the last bit."""
     return SceneDocument(
         name=scene.name,
         luminous_efficacy=scene.luminous_efficacy,

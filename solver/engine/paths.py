@@ -19,6 +19,9 @@ KEPT: Final = 4
 INTEREST: Final = 10.0
 """Seconds for which a frame is worked on after it was last asked for."""
 
+KEPT_PIXELS: Final = 2**22
+"""Pixels kept at once, 48 bytes each, unless a single frame has more."""
+
 _SAMPLES_PER_PASS: Final = 4
 
 _Key: TypeAlias = tuple[object, ...]
@@ -65,11 +68,14 @@ class PathFrames:
                 self._tracer = PathTracer(self._world.surfaces, self._world.rays)
             asked = self._asked[key] = AskedFrame(self._tracer.frame(camera, _SAMPLES_PER_PASS))
         self._asked.move_to_end(key)
-        if len(self._asked) > KEPT:
+        while len(self._asked) > 1 and (len(self._asked) > KEPT or self._pixels() > KEPT_PIXELS):
             self._asked.popitem(last=False)
         asked.samples = max(asked.samples, samples)
         asked.wanted_until = time.monotonic() + INTEREST
         return asked
+
+    def _pixels(self) -> int:
+        return sum(asked.frame.camera.width * asked.frame.camera.height for asked in self._asked.values())
 
     def step(self, budget: float, tolerance: float) -> bool:
         """Work for about `budget` seconds on the frame that is furthest behind; False if none needs work."""

@@ -133,7 +133,7 @@ class Encoding:
     format: PictureFormat | LinearFormat = PictureFormat.PNG
     exposure: float | None = None
     """Stops; None: so that the picture is neither dark nor pale. Only pictures of radiance heed it."""
-    tone_map: ToneCurve = ToneCurve.FILMIC
+    tone_map: ToneCurve = ToneCurve.LINEAR
     """Only pictures of radiance heed it."""
 
 

@@ -16,13 +16,22 @@ import numpy as np
 
 from solver.document.edits import MoveEdit, RemoveEdit, SetMaterialEdit
 from solver.document.models import MaterialDocument, TransformDocument
-from solver.engine.drawing import Drawing
+from solver.engine.drawing import Drawing, encode
 from solver.engine.engine import Engine
-from solver.engine.requests import CameraChoice, FrameRequest, LayerName, NotAvailableError, RendererName
+from solver.engine.requests import (
+    CameraChoice,
+    Encoding,
+    FrameRequest,
+    LayerName,
+    NotAvailableError,
+    RendererName,
+)
 from solver.engine.world import World
 from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
 from solver.pathtracing import PathTracer
+from solver.rendering.encoding import LinearFormat, PictureFormat
 from solver.rendering.tessellation import Tessellator
+from solver.rendering.tone_mapping import ToneCurve
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 
@@ -67,6 +76,7 @@ def warm_steps(drawing: Drawing) -> tuple[WarmStep, ...]:
         WarmStep("edit and probe", lambda: _edit(drawing)),
         WarmStep("mesh", _mesh),
         WarmStep("draw", lambda: _draw(drawing)),
+        WarmStep("encode", _encode),
         WarmStep("trace paths", _trace),
     )
 
@@ -169,6 +179,15 @@ def _drawable(drawing: Drawing) -> Iterator[FrameRequest]:
                 continue
             for samples in (1, 4):
                 yield FrameRequest(CameraChoice(), renderer, layer, samples)
+
+
+def _encode() -> None:
+    """A file of every format and by every curve; path-traced frames need them without OpenGL too."""
+    image = np.full((8, 8, 3), 0.2, dtype=np.float32)
+    for chosen in (*PictureFormat, *LinearFormat):
+        encode(image, LayerName.RADIANCE, Encoding(chosen))
+    for curve in ToneCurve:
+        encode(image, LayerName.RADIANCE, Encoding(PictureFormat.PNG, tone_map=curve))
 
 
 def _trace() -> None:

@@ -38,7 +38,5 @@ class World:
 
 def _same_triangles(a: Surfaces, b: Surfaces) -> bool:
     return (
-        a.size == b.size
-        and np.array_equal(a.center, b.center)
-        and np.array_equal(a.triangles, b.triangles)
+        a.size == b.size and np.array_equal(a.center, b.center) and np.array_equal(a.triangles, b.triangles)
     )
