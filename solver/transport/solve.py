@@ -112,7 +112,7 @@ class RadiositySolver:
         self._closed = False
         self._closure = np.ones(surfaces.patch_count)
         self._radiosity: Spectra = self._patch_emission.copy()
-        self._received: Spectra = np.zeros_like(self._radiosity)
+        self._received: Spectra = np.tile(self._ambient(), (surfaces.patch_count, 1))
         if warm_start is not None:
             self._adopt(warm_start)
         self._counts = {"rays": 0, "rounds": 0, "gathers": 0}
@@ -161,13 +161,11 @@ class RadiositySolver:
         )
 
     def field(self) -> RadiosityField:
-        """The leaves and their radiosities; until light has moved, with the ambient term for what has not."""
+        """The leaves and their radiosities; the ambient term where no light is known yet."""
         tree = self._tree
         leaves = tree.leaves
         patch = tree.patch[leaves]
         received = self._received[leaves]
-        if len(self._links) == 0:
-            received = received + self._ambient()
         radiosity = self._patch_emission[patch] + self._patch_reflectance[patch] * received
         return RadiosityField(
             corners=tree.corners[leaves],
@@ -184,8 +182,9 @@ class RadiositySolver:
     def _ambient(self) -> FloatArray:
         """Mean irradiance of the scene if it were one well-mixed enclosure, (channels,)."""
         area = self.surfaces.area[:, None]
-        emitted = (area * self._patch_emission).sum(axis=0) / area.sum()
-        absorbed = 1.0 - (area * self._patch_reflectance).sum(axis=0) / area.sum()
+        total = max(float(area.sum()), 1e-300)
+        emitted = (area * self._patch_emission).sum(axis=0) / total
+        absorbed = 1.0 - (area * self._patch_reflectance).sum(axis=0) / total
         return np.asarray(emitted / absorbed)
 
     def _adopt(self, earlier: RadiositySolver) -> None:
