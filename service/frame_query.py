@@ -104,7 +104,7 @@ class FrameQuery(BaseModel):
     exposure: Annotated[float, Field(allow_inf_nan=False, ge=-64.0, le=64.0)] | Literal["auto"] = Field(
         default="auto", description="Stops, for pictures of radiance."
     )
-    tone_map: ToneCurve = Field(default=ToneCurve.FILMIC, description="For pictures of radiance.")
+    tone_map: ToneCurve = Field(default=ToneCurve.LINEAR, description="For pictures of radiance.")
     layer: LayerName = Field(
         default=LayerName.RADIANCE,
         description="What a pixel shows. `triangle`, `barycentric`, `error` and `false_colour` are not "

@@ -36,6 +36,10 @@ def read(document: dict[str, Any]) -> Scene:
     return parse_scene(json.dumps(document).encode())
 
 
+def scene_with_vertex(*vertex: Any) -> dict[str, Any]:
+    return scene_with(mesh={"vertices": [vertex], "faces": []})
+
+
 def there_and_back(scene: Scene) -> Scene:
     """What posting the scene that is told gives: a transform is told by its parts or its matrix, not both."""
     return parse_scene(document_of(scene).model_dump_json(exclude_unset=True).encode())
@@ -77,8 +81,8 @@ def assert_same(a: Scene, b: Scene) -> None:
         (scene_with(mesh={**SQUARE, "faces": [[0, 1, -1]]}), ("objects", 0, "mesh", "faces", 0, 2)),
         (scene_with(mesh={**SQUARE, "faces": [[0, 1, 2], [0, 4, 1]]}), ("objects", 0, "mesh", "faces", 1, 1)),
         (scene_with(mesh={**SQUARE, "faces": [[0, 1, 2.5]]}), ("objects", 0, "mesh", "faces", 0, 2)),
-        (scene_with(mesh={"vertices": [[0, 0]], "faces": []}), ("objects", 0, "mesh", "vertices", 0)),
-        (scene_with(mesh={"vertices": [[0, 0, "1"]], "faces": []}), ("objects", 0, "mesh", "vertices", 0, 2)),
+        (scene_with_vertex(0, 0), ("objects", 0, "mesh", "vertices", 0)),
+        (scene_with_vertex(0, 0, "1"), ("objects", 0, "mesh", "vertices", 0, 2)),
         (
             scene_with(mesh={"vertices": [[0, 0, True]], "faces": []}),
             ("objects", 0, "mesh", "vertices", 0, 2),
@@ -87,10 +91,7 @@ def assert_same(a: Scene, b: Scene) -> None:
             scene_with(mesh={"vertices": [[0, 0, 1e10]], "faces": []}),
             ("objects", 0, "mesh", "vertices", 0, 2),
         ),
-        (
-            scene_with(mesh={"vertices": [[0, 0, math.nan]], "faces": []}),
-            ("objects", 0, "mesh", "vertices", 0, 2),
-        ),
+        (scene_with_vertex(0, 0, math.nan), ("objects", 0, "mesh", "vertices", 0, 2)),
         (scene_with(material={"reflectance": [1.0, 0, 0]}), ("objects", 0, "material", "reflectance", 0)),
         (scene_with(material={"reflectance": [0.5, 0.5]}), ("objects", 0, "material", "reflectance")),
         (scene_with(material={"emission": [0, 0, -1]}), ("objects", 0, "material", "emission", 2)),
