@@ -108,8 +108,8 @@ def visible_fraction(
         return float("nan")
     start = np.broadcast_to(x[:, None], way.shape)[used]
     end = np.broadcast_to(y[None], way.shape)[used]
-    free = blocking_margin(start, end, triangles) <= tolerance
-    return float(weight[used] @ free / weight[used].sum())
+    hidden = blocking_margin(start, end, triangles) > tolerance
+    return 1.0 - float(weight[used][hidden].sum() / weight[used].sum())
 
 
 def blocks(first: Points, second: Points, blocker: Points, per_side: int, tolerance: float) -> bool:
