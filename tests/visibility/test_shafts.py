@@ -137,7 +137,8 @@ def test_inherited_classes_and_blockers(soup: Soup, seed: int) -> None:
         out, planes = np.empty(len(parents), dtype=np.int32), np.empty((MAX_PLANES, 4))
         part_kind, kept = inherited_blockers(
             _padded(first), len(first), s.normal[p], _padded(second), len(second), s.normal[q],
-            s.corners, s.corner_count, s.normal, parents, 0, len(parents), side_tolerance(soup), planes, out, 0,
+            s.corners, s.corner_count, s.normal, parents, 0, len(parents), side_tolerance(soup), planes,
+            out, 0,
         )  # fmt: skip
         remaining = set(out[:kept].tolist())
         assert remaining <= blockers
@@ -180,7 +181,7 @@ def test_planes_leave_little_around_the_hull() -> None:
             random.uniform(-1, 1, 3) + 0.2 * SQUARE @ np.linalg.qr(random.normal(size=(3, 3)))[0]
             for _ in range(20)
         ]
-        soup = soup_of([SQUARE * 0.7 - [0, 0, 1.5], DOWN * 0.4 + [0, 0, 1.5], *loose])
+        soup = soup_of([SQUARE * 0.7 - np.array([0, 0, 1.5]), DOWN * 0.4 + np.array([0, 0, 1.5]), *loose])
         found = classify(soup)
         at = found.pairs.index((1, 0))
         for other in others(soup, 0, 1):
@@ -207,15 +208,15 @@ def single(soup: Soup) -> tuple[int, set[int]]:
 @pytest.mark.parametrize(
     ("screen", "expected"),
     [
-        (SQUARE * 3.0 + [0, 0, 1], (NONE, {2})),
-        (SQUARE * 1.001 + [0, 0, 1], (NONE, {2})),
-        (SQUARE * 0.9 + [0, 0, 1], (PARTIAL, {2})),
-        (SQUARE + [2.1, 0, 1], (FULL, set())),
-        (SQUARE + [1.9, 0, 1], (PARTIAL, {2})),
-        (SQUARE * 3.0 + [0, 0, -0.5], (FULL, set())),
-        (SQUARE * 3.0 + [0, 0, 2.5], (FULL, set())),
+        (SQUARE * 3.0 + np.array([0, 0, 1]), (NONE, {2})),
+        (SQUARE * 1.001 + np.array([0, 0, 1]), (NONE, {2})),
+        (SQUARE * 0.9 + np.array([0, 0, 1]), (PARTIAL, {2})),
+        (SQUARE + np.array([2.1, 0, 1]), (FULL, set())),
+        (SQUARE + np.array([1.9, 0, 1]), (PARTIAL, {2})),
+        (SQUARE * 3.0 + np.array([0, 0, -0.5]), (FULL, set())),
+        (SQUARE * 3.0 + np.array([0, 0, 2.5]), (FULL, set())),
         (SQUARE * 3.0, (FULL, set())),
-        (SQUARE * 3.0 + [0, 0, 2], (FULL, set())),
+        (SQUARE * 3.0 + np.array([0, 0, 2]), (FULL, set())),
     ],
     ids=[
         "large",
@@ -231,13 +232,13 @@ def single(soup: Soup) -> tuple[int, set[int]]:
 )
 def test_a_screen_between_two_squares(screen: FloatArray, expected: tuple[int, set[int]]) -> None:
     for turned in (screen, screen[::-1]):
-        assert single(soup_of([SQUARE, DOWN + [0, 0, 2], turned])) == expected
+        assert single(soup_of([SQUARE, DOWN + np.array([0, 0, 2]), turned])) == expected
 
 
 def test_two_halves_of_a_screen_hide_all_and_are_both_listed() -> None:
     """NONE is claimed for one polygon that hides all; two together are PARTIAL, and rays tell."""
     left = np.array([[-3.0, -3, 1], [0.01, -3, 1], [0.01, 3, 1], [-3, 3, 1]])
-    soup = soup_of([SQUARE, DOWN + [0, 0, 2], left, left + [3.0, 0, 0]])
+    soup = soup_of([SQUARE, DOWN + np.array([0, 0, 2]), left, left + np.array([3.0, 0, 0])])
     assert single(soup) == (PARTIAL, {2, 3})
     assert fraction(soup, soup.polygon(0), soup.polygon(1), {2, 3}) == 0.0
 
