@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Annotated, Final, Literal, TypeAlias
 
@@ -24,23 +25,29 @@ from solver.rendering.tone_mapping import ToneCurve
 _MAX_ERROR: Final = re.compile(r"max_error=(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)")
 _NUMBER: Final = r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?"
 
-_Coordinate: TypeAlias = Annotated[float, Field(allow_inf_nan=False, ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
-_Triple: TypeAlias = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Triple: TypeAlias = tuple[float, float, float]
 
 
-def _split(text: object) -> object:
-    if not isinstance(text, str):
-        return text
-    parts = text.split(",")
-    if len(parts) != 3:
-        raise PydanticCustomError("not_a_triple", "three numbers are needed, as in 1,2,3")
-    return parts
+def _triple(text: str) -> _Triple:
+    """The numbers of a text like 1,2,3. Raises PydanticCustomError."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise PydanticCustomError("not_a_triple", "three numbers are needed, as in 1,2,3") from None
+    if not max(abs(x), abs(y), abs(z)) <= MAX_COORDINATE or not all(map(math.isfinite, (x, y, z))):
+        raise PydanticCustomError("out_of_bounds", f"each number must be within {MAX_COORDINATE:g} of 0")
+    return x, y, z
 
 
-def _not_zero(vector: _Triple) -> _Triple:
-    if not any(vector):
+def _point(text: str) -> str:
+    _triple(text)
+    return text
+
+
+def _direction(text: str) -> str:
+    if not any(_triple(text)):
         raise PydanticCustomError("zero_vector", "a direction of length 0 points nowhere")
-    return vector
+    return text
 
 
 def _wait(text: object) -> object:
@@ -57,9 +64,10 @@ def _wait(text: object) -> object:
 _AsTriple = WithJsonSchema(
     {"type": "string", "pattern": f"^{_NUMBER},{_NUMBER},{_NUMBER}$", "examples": ["1,2,3"]}
 )
-PointText: TypeAlias = Annotated[_Triple, BeforeValidator(_split), _AsTriple]
+# Texts, since FastAPI takes a parameter of a sequence type to be one that is given several times.
+PointText: TypeAlias = Annotated[str, AfterValidator(_point), _AsTriple]
 """x,y,z in metres."""
-DirectionText: TypeAlias = Annotated[_Triple, AfterValidator(_not_zero), BeforeValidator(_split), _AsTriple]
+DirectionText: TypeAlias = Annotated[str, AfterValidator(_direction), _AsTriple]
 """x,y,z of any length but 0."""
 WaitText: TypeAlias = Annotated[
     Wait,
@@ -128,14 +136,15 @@ class FrameQuery(BaseModel):
         """What is to be drawn."""
         camera = CameraChoice(
             name=self.camera,
-            eye=self.eye,
-            target=self.target,
-            up=self.up,
+            eye=None if self.eye is None else _triple(self.eye),
+            target=None if self.target is None else _triple(self.target),
+            up=None if self.up is None else _triple(self.up),
             vertical_fov=self.vertical_fov,
             width=self.width,
             height=self.height,
         )
-        return FrameRequest(camera, self.renderer, self.layer, self.samples)
+        max_error = self.wait.max_error if self.wait.until is WaitFor.MAX_ERROR else math.inf
+        return FrameRequest(camera, self.renderer, self.layer, self.samples, max_error)
 
     def encoding(self, chosen: FrameFormat) -> Encoding:
         """How it is to be turned into a file of that format."""

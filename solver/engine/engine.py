@@ -150,7 +150,8 @@ class Engine:
         if renderer is RendererName.PATH:
             if request.layer is not LayerName.RADIANCE:
                 raise NotAvailableError("layer of the path renderer", request.layer, (LayerName.RADIANCE,))
-            return PathView(self._paths.ask(camera, request.samples), self._settings.error_tolerance)
+            asked = self._paths.ask(camera, request.samples, request.max_error)
+            return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
         return SolutionView(self._solution, self._drawing, camera, renderer, request.layer, request.samples)
 

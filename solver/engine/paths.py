@@ -5,6 +5,7 @@ A frame goes on improving until it is within the tolerance, or until nobody has 
 
 from __future__ import annotations
 
+import math
 import time
 from collections import OrderedDict
 from typing import Final, TypeAlias
@@ -34,6 +35,8 @@ class AskedFrame:
         self.frame = frame
         self.samples = 1
         """Samples of a pixel without which the frame is not shown."""
+        self.max_error = math.inf
+        """Error of which somebody needs the frame."""
         self.wanted_until = 0.0
         self._error = float("inf")
         self._error_passes = 0
@@ -47,8 +50,11 @@ class AskedFrame:
 
     def needs_work(self, tolerance: float) -> bool:
         """Whether the frame is wanted, and too few or too noisy samples are in it."""
-        wanted = self.wanted_until > time.monotonic()
-        return wanted and (self.frame.samples < self.samples or self.error_estimate > tolerance)
+        return self.wanted_until > time.monotonic() and not self.is_done(tolerance)
+
+    def is_done(self, tolerance: float) -> bool:
+        """Whether it has the samples and the error that were asked for, and is within `tolerance`."""
+        return self.frame.samples >= self.samples and self.error_estimate <= min(tolerance, self.max_error)
 
 
 class PathFrames:
@@ -59,8 +65,11 @@ class PathFrames:
         self._tracer: PathTracer | None = None
         self._asked: OrderedDict[_Key, AskedFrame] = OrderedDict()
 
-    def ask(self, camera: Camera, samples: int) -> AskedFrame:
-        """The frame of `camera` as it stands; it is wanted from now on, with at least `samples` a pixel."""
+    def ask(self, camera: Camera, samples: int, max_error: float = math.inf) -> AskedFrame:
+        """The frame of `camera` as it stands.
+
+        It is wanted from now on, with at least `samples` a pixel and at most that error.
+        """
         key = _key(camera)
         asked = self._asked.get(key)
         if asked is None:
@@ -71,6 +80,7 @@ class PathFrames:
         while len(self._asked) > 1 and (len(self._asked) > KEPT or self._pixels() > KEPT_PIXELS):
             self._asked.popitem(last=False)
         asked.samples = max(asked.samples, samples)
+        asked.max_error = min(asked.max_error, max_error)
         asked.wanted_until = time.monotonic() + INTEREST
         return asked
 

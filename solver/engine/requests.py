@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -102,6 +103,8 @@ class FrameRequest:
     layer: LayerName = LayerName.RADIANCE
     samples: int = 1
     """Samples of a pixel, for antialiasing."""
+    max_error: float = math.inf
+    """A path-traced frame is worked on until its error is at most this, and within the tolerance."""
 
 
 @dataclass(frozen=True)

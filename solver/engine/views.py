@@ -148,7 +148,7 @@ class PathView:
     @property
     def improving(self) -> bool:
         """More paths always help, until the frame is as good as asked."""
-        return not self.converged
+        return not self.asked.is_done(self.tolerance)
 
     @property
     def version(self) -> int:
