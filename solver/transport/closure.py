@@ -2,7 +2,9 @@
 
 Form factors of an enclosure sum to 1 from every element; sampled visibility and tolerances leave errors
 of parts in a thousand, which reflectances near 1 would amplify a hundredfold. The sums are restored by
-symmetric scaling, G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity. Whether a scene
+symmetric scaling, G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity, and the rest and
+the gradient that a leaf would see in a uniform field by coupling it with itself. In an open scene the row
+sums are what they are; only those that would let light multiply are brought down. Whether a scene
 is closed is asked of rays: if `PROBES` cosine-distributed rays, spread over the surfaces by area, all
 end on fronts, at most about 3 / PROBES of the light can escape unseen (95 % confidence).
 """
@@ -10,16 +12,21 @@ end on fronts, at most about 3 / PROBES of the light can escape unseen (95 % con
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
-from solver.types import BoolArray, FloatArray
+from solver.transport.state import TransportState
 from solver.visibility.rays import RayScene
 
 PROBES: Final = 16384
+_STEPS: Final = 2
+_MOST_REFLECTED: Final = 0.995
+"""In an open scene no leaf reflects more than this share of a uniform field, whatever its links say."""
+
 _LIMIT: Final = 0.25
 """A row sum further from 1 than this is not a rounding matter and is left alone."""
 
@@ -62,19 +69,31 @@ def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
     return bool(np.all(from_front | two_sided))
 
 
-def rescale(
-    closure: FloatArray, row_sum: FloatArray, leaf: BoolArray, limit: FloatArray, closed: bool
-) -> FloatArray:
-    """One Sinkhorn step: new scale factors (n,) from the row sums (n,) that the present ones give.
-
-    In an open scene the row sums are what they are, and only those above `limit` (n,), which would let
-    light multiply, are brought down to it.
-    """
+def balance(state: TransportState, closed: bool) -> Iterator[None]:
+    """Bring the row sums to where they must be, after links have changed."""
+    tree = state.tree
+    n = len(tree)
+    leaf = tree.child < 0
+    state.closure = np.ones(n)
+    state.remainder = np.zeros((n, 3))
+    unit = np.zeros((n, 3, 1))
+    unit[:, 0] = 1.0
+    highest = state.reflectance.max(axis=1)[tree.patch]
+    limit = _MOST_REFLECTED / np.maximum(highest, 1e-300)
+    for _ in range(_STEPS):
+        row_sum = state.gather(unit)[:, 0, 0]
+        yield
+        if closed:
+            target = np.where(leaf & (np.abs(row_sum - 1.0) < _LIMIT), 1.0, row_sum)
+        else:
+            target = np.where(leaf, np.minimum(row_sum, limit), row_sum)
+        off = target != row_sum
+        if not off.any():
+            return
+        state.closure[off] *= np.sqrt(target[off] / row_sum[off])
     if closed:
-        target = np.where(leaf & (np.abs(row_sum - 1.0) < _LIMIT), 1.0, row_sum)
-    else:
-        target = np.where(leaf, np.minimum(row_sum, limit), row_sum)
-    out = closure.copy()
-    off = target != row_sum
-    out[off] *= np.sqrt(target[off] / row_sum[off])
-    return out
+        rows = state.gather(unit)[:, :, 0]
+        trusted = leaf & (np.abs(rows[:, 0] - 1.0) < _LIMIT)
+        state.remainder[trusted] = -rows[trusted]
+        state.remainder[trusted, 0] += 1.0
+        yield

@@ -5,6 +5,9 @@ backward sweep pulls and one forward sweep pushes. A quadrilateral or triangle s
 edge midpoints; a quadrilateral at least twice as long as wide splits into two across its length, so that
 slivers do not breed slivers. Midpoints are computed alike from either side of an edge: vertices that
 neighbours share are bit-identical.
+
+An element carries linear functions of position: f(x) = mean + gradient . (x - centroid), x in the two
+axes of its patch. Hence its centroid, its second moments and its place in its parent are kept.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray, IntArray
+from solver.types import Corners, FloatArray, IntArray, Points
 
 
 class ElementTree:
@@ -24,6 +27,8 @@ class ElementTree:
         n = surfaces.patch_count
         self.patch_count = n
         self.patch_normal = surfaces.normal
+        self.axes = plane_axes(surfaces.normal)
+        """(p, 2, 3) orthonormal axes of each patch's plane"""
         self._corners = GrowingArray((4, 3), np.float64, n + 1024)
         self._corner_count = GrowingArray((), np.int32, n + 1024)
         self._patch = GrowingArray((), np.int32, n + 1024)
@@ -31,6 +36,9 @@ class ElementTree:
         self._child = GrowingArray((), np.int32, n + 1024)
         self._child_count = GrowingArray((), np.int32, n + 1024)
         self._area = GrowingArray((), np.float64, n + 1024)
+        self._centroid = GrowingArray((3,), np.float64, n + 1024)
+        self._moment = GrowingArray((3,), np.float64, n + 1024)
+        self._offset = GrowingArray((2,), np.float64, n + 1024)
         self._corners.append(surfaces.corners)
         self._corner_count.append(surfaces.corner_count)
         self._patch.append(np.arange(n, dtype=np.int32))
@@ -38,6 +46,9 @@ class ElementTree:
         self._child.append(np.full(n, -1, dtype=np.int32))
         self._child_count.grow(n)
         self._area.append(surfaces.area)
+        for array in (self._centroid, self._moment, self._offset):
+            array.grow(n)
+        self._place(0)
 
     def __len__(self) -> int:
         return len(self._area)
@@ -78,6 +89,21 @@ class ElementTree:
         return self._area.live
 
     @property
+    def centroid(self) -> Points:
+        """(n, 3) metres"""
+        return self._centroid.live
+
+    @property
+    def moment(self) -> FloatArray:
+        """(n, 3) mean of uu, uv, vv over the element, m2; u, v from the centroid, by the patch's axes"""
+        return self._moment.live
+
+    @property
+    def offset(self) -> FloatArray:
+        """(n, 2) centroid less the parent's, m, by the patch's axes; 0 for patches"""
+        return self._offset.live
+
+    @property
     def leaves(self) -> IntArray:
         """Indices of the leaves, ascending."""
         return np.flatnonzero(self.child < 0).astype(np.int32)
@@ -95,6 +121,9 @@ class ElementTree:
                 self._child,
                 self._child_count,
                 self._area,
+                self._centroid,
+                self._moment,
+                self._offset,
             )
         )
 
@@ -113,6 +142,9 @@ class ElementTree:
             self._parent,
             self._child_count,
             self._area,
+            self._centroid,
+            self._moment,
+            self._offset,
         ):
             array.grow(total)
         self._child.grow(total)[...] = -1
@@ -121,6 +153,22 @@ class ElementTree:
         _make_children(
             ids, first, counts, self.corners, self.corner_count, self.patch, self.parent, self.area
         )
+        self._place(len(self) - total)
+
+    def _place(self, start: int) -> None:
+        """Find centroids, moments and offsets of the elements from `start` on."""
+        _place_elements(
+            self.corners, self.corner_count, self.patch, self.parent, self.axes, start, self.centroid,
+            self.moment, self.offset,
+        )  # fmt: skip
+
+
+def plane_axes(normals: FloatArray) -> FloatArray:
+    """Two orthonormal axes (p, 2, 3) of the planes with unit normals (p, 3), right-handed with them."""
+    helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)] if len(normals) else np.empty((0, 3))
+    first = np.cross(helper, normals)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.ascontiguousarray(np.stack([first, np.cross(normals, first)], axis=1))
 
 
 @kernel
@@ -229,3 +277,55 @@ def polygon_area(corners: FloatArray) -> float:
     cy = az * bx - ax * bz
     cz = ax * by - ay * bx
     return 0.5 * np.sqrt(cx * cx + cy * cy + cz * cz)
+
+
+@kernel
+def _place_elements(
+    corners: Corners,
+    corner_count: IntArray,
+    patch: IntArray,
+    parent: IntArray,
+    axes: FloatArray,
+    start: int,
+    centroid: Points,
+    moment: FloatArray,
+    offset: FloatArray,
+) -> None:
+    x = np.empty((4, 2))
+    for e in range(start, len(corners)):
+        u = axes[patch[e], 0]
+        v = axes[patch[e], 1]
+        n = corner_count[e]
+        for k in range(n):
+            x[k, :] = 0.0
+            for axis in range(3):
+                d = corners[e, k, axis] - corners[e, 0, axis]
+                x[k, 0] += d * u[axis]
+                x[k, 1] += d * v[axis]
+        # One or two triangles; a triangle with corners a, b, c at mean m has the second moments
+        # (a a + b b + c c + 9 m m) / 12.
+        weight = 0.0
+        cu = cv = uu = uv = vv = 0.0
+        for k in range(1, n - 1):
+            w = x[k, 0] * x[k + 1, 1] - x[k, 1] * x[k + 1, 0]
+            mu = (x[k, 0] + x[k + 1, 0]) / 3.0
+            mv = (x[k, 1] + x[k + 1, 1]) / 3.0
+            weight += w
+            cu += w * mu
+            cv += w * mv
+            uu += w * (x[k, 0] ** 2 + x[k + 1, 0] ** 2 + 9.0 * mu * mu) / 12.0
+            uv += w * (x[k, 0] * x[k, 1] + x[k + 1, 0] * x[k + 1, 1] + 9.0 * mu * mv) / 12.0
+            vv += w * (x[k, 1] ** 2 + x[k + 1, 1] ** 2 + 9.0 * mv * mv) / 12.0
+        cu /= weight
+        cv /= weight
+        moment[e, 0] = uu / weight - cu * cu
+        moment[e, 1] = uv / weight - cu * cv
+        moment[e, 2] = vv / weight - cv * cv
+        for axis in range(3):
+            centroid[e, axis] = corners[e, 0, axis] + cu * u[axis] + cv * v[axis]
+        offset[e, :] = 0.0
+        if parent[e] >= 0:
+            for axis in range(3):
+                d = centroid[e, axis] - centroid[parent[e], axis]
+                offset[e, 0] += d * u[axis]
+                offset[e, 1] += d * v[axis]

@@ -15,6 +15,10 @@ class SolveOutcome(Enum):
     CONVERGED = "The estimated error is within the tolerance."
     ELEMENT_LIMIT = "The element limit was reached before the tolerance: raise max_elements or error_tolerance."
     LINK_LIMIT = "The link limit was reached before the tolerance: raise max_links or error_tolerance."
+    TRANSPORT_ERROR = (
+        "No link errs by more than transport_error, but the field does by more than error_tolerance: "
+        "lower transport_error."
+    )
     MINIMUM_AREA = "Every element that needs refinement has the minimum area: lower minimum_area."
 
 

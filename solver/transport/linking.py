@@ -1,4 +1,4 @@
-"""From pairs of elements to evaluated links: exchange area, its deviations, blockers and visibility.
+"""From pairs of elements to evaluated links: exchange area, its variation, blockers and visibility.
 
 Everything runs in bulk: kernels over ranges of pairs, then one batch of rays for the pairs that have
 blockers. Pairs without blockers cost no ray ("model only what a scene needs").
@@ -15,12 +15,12 @@ from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.transport.deviation import form_factor_deviation
 from solver.transport.elements import ElementTree
 from solver.transport.exchange import exchange_area, heights
 from solver.transport.links import LinkBatch, ragged_indices
 from solver.transport.oracle import samples_needed
-from solver.types import Corners, FloatArray, Int64Array, IntArray
+from solver.transport.variation import form_factor_variation, solve_moment
+from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
@@ -153,13 +153,14 @@ class Linker:
         light: Light,
     ) -> LinkBatch:
         n = len(p)
-        open_exchange, deviation_p, deviation_q = np.zeros(n), np.zeros(n), np.zeros(n)
+        open_exchange = np.zeros(n)
+        position, residual = np.zeros((2, n, 2)), np.zeros((2, n))
 
         def work(start: int, stop: int) -> None:
             _exchange(
-                p, q, kind, tree.corners, tree.corner_count, tree.area, tree.patch, self.surfaces.normal,
-                self.side_tolerance, self.exchange_tolerance, start, stop, open_exchange, deviation_p,
-                deviation_q,
+                p, q, kind, tree.corners, tree.corner_count, tree.area, tree.patch, tree.centroid, tree.moment,
+                self.surfaces.normal, tree.axes, self.side_tolerance, self.exchange_tolerance, start, stop,
+                open_exchange, position[0], position[1], residual[0], residual[1],
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK)
@@ -175,16 +176,23 @@ class Linker:
         for count in np.unique(samples[partial]):
             part = partial[samples[partial] == count]
             found = visible_fractions(
-                self.rays, p[part], q[part], tree.corners, tree.corner_count, tree.area,
-                tree.patch, self.surfaces.normal, int(count),
+                self.rays, p[part], q[part], tree.corners, tree.corner_count, tree.area, tree.patch,
+                self.surfaces.normal, tree.axes, tree.centroid, tree.moment, int(count),
             )  # fmt: skip
             seen = found.visibility
             visibility[part] = seen
             noise[part] = found.noise
-            for deviation, end, spread in ((deviation_p, p, found.spread_p), (deviation_q, q, found.spread_q)):
-                mean = open_exchange[part] / tree.area[end[part]]
-                varied = deviation[part] ** 2
-                deviation[part] = np.sqrt(seen**2 * varied + (mean**2 + varied) * spread)
+            for end, element, lean, spread in (
+                (0, p, found.lean_p, found.residual_p),
+                (1, q, found.lean_q, found.residual_q),
+            ):
+                position[end, part] = seen[:, None] * position[end, part] + lean
+                mean = open_exchange[part] / tree.area[element[part]]
+                varied = residual[end, part] ** 2
+                residual[end, part] = np.sqrt(seen**2 * varied + (mean**2 + varied) * spread)
+        slope = np.empty((2, n, 2))
+        for end, element in enumerate((p, q)):
+            _slopes(tree.moment, element, open_exchange, position[end], slope[end])
         alive = (open_exchange > 0.0) | (kind == NONE)
         ends = np.cumsum(kept, dtype=np.int64)
         return LinkBatch(
@@ -195,8 +203,10 @@ class Linker:
             samples=samples[alive],
             noise=noise[alive],
             kind=kind[alive],
-            deviation_p=deviation_p[alive],
-            deviation_q=deviation_q[alive],
+            slope_p=slope[0, alive],
+            slope_q=slope[1, alive],
+            residual_p=residual[0, alive],
+            residual_q=residual[1, alive],
             blocker_count=kept[alive],
             blockers=pool[ragged_indices((ends - kept)[alive], kept[alive])],
         )
@@ -271,6 +281,17 @@ def _inherit(
 
 
 @kernel
+def _slopes(
+    moment: FloatArray, element: IntArray, exchange: FloatArray, position: FloatArray, slope: FloatArray
+) -> None:
+    """Exchange (n,) per metre (n, 2) from the mean position (n, 2) of the light on the elements (n,)."""
+    for link in range(len(element)):
+        a, b = solve_moment(moment[element[link]], position[link, 0], position[link, 1])
+        slope[link, 0] = exchange[link] * a
+        slope[link, 1] = exchange[link] * b
+
+
+@kernel
 def _exchange(
     p: IntArray,
     q: IntArray,
@@ -279,14 +300,19 @@ def _exchange(
     counts: IntArray,
     area: FloatArray,
     patch: IntArray,
+    centroid: Points,
+    moment: FloatArray,
     normals: FloatArray,
+    axes: FloatArray,
     side_tolerance: float,
     tolerance: float,
     start: int,
     stop: int,
     exchange: FloatArray,
-    deviation_p: FloatArray,
-    deviation_q: FloatArray,
+    position_p: FloatArray,
+    position_q: FloatArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
 ) -> None:
     scratch = np.empty((2, 8, 3))
     for pair in range(start, stop):
@@ -300,10 +326,13 @@ def _exchange(
             corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], side_tolerance,
             tolerance, scratch,
         )  # fmt: skip
-        if exchange[pair] > 0.0:
-            deviation_p[pair] = form_factor_deviation(
-                corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], exchange[pair], scratch[0]
-            )
-            deviation_q[pair] = form_factor_deviation(
-                corners[j], counts[j], n2, area[j], corners[i], counts[i], n1, area[i], exchange[pair], scratch[0]
-            )
+        if exchange[pair] <= 0.0:
+            continue
+        residual_p[pair] = form_factor_variation(
+            corners[i], counts[i], n1, axes[patch[i]], centroid[i], moment[i], area[i], corners[j], counts[j],
+            n2, area[j], centroid[j], exchange[pair], scratch[0], position_p[pair],
+        )  # fmt: skip
+        residual_q[pair] = form_factor_variation(
+            corners[j], counts[j], n2, axes[patch[j]], centroid[j], moment[j], area[j], corners[i], counts[i],
+            n1, area[i], centroid[i], exchange[pair], scratch[0], position_q[pair],
+        )  # fmt: skip

@@ -32,9 +32,13 @@ class LinkBatch:
     """(n,) expected squared error of `visibility` from sampling"""
     kind: IntArray
     """(n,) FULL, PARTIAL or NONE of `visibility.shafts`"""
-    deviation_p: FloatArray
-    """(n,) RMS deviation over p of the form factor from its points to q"""
-    deviation_q: FloatArray
+    slope_p: FloatArray
+    """(n, 2) m2 per metre: how the visible exchange varies with the position on p"""
+    slope_q: FloatArray
+    """(n, 2) the same on q"""
+    residual_p: FloatArray
+    """(n,) RMS deviation over p of the form factor from its points to q, from the linear function"""
+    residual_q: FloatArray
     """(n,) the same over q"""
     blocker_count: IntArray
     """(n,) length of each blocker list"""
@@ -53,8 +57,10 @@ class LinkTable:
         self._samples = GrowingArray((), np.int32, 4096)
         self._noise = GrowingArray((), np.float64, 4096)
         self._kind = GrowingArray((), np.int32, 4096)
-        self._deviation_p = GrowingArray((), np.float64, 4096)
-        self._deviation_q = GrowingArray((), np.float64, 4096)
+        self._slope_p = GrowingArray((2,), np.float64, 4096)
+        self._slope_q = GrowingArray((2,), np.float64, 4096)
+        self._residual_p = GrowingArray((), np.float64, 4096)
+        self._residual_q = GrowingArray((), np.float64, 4096)
         self._blocker_start = GrowingArray((), np.int64, 4096)
         self._blocker_count = GrowingArray((), np.int32, 4096)
         self._pool = GrowingArray((), np.int32, 4096)
@@ -98,14 +104,29 @@ class LinkTable:
         return self._kind.live
 
     @property
-    def deviation_p(self) -> FloatArray:
-        """(n,) RMS deviation over p of the form factor to q"""
-        return self._deviation_p.live
+    def exchange(self) -> FloatArray:
+        """(n,) m2, of what is visible"""
+        return self.open_exchange * self.visibility
 
     @property
-    def deviation_q(self) -> FloatArray:
-        """(n,) RMS deviation over q of the form factor to p"""
-        return self._deviation_q.live
+    def slope_p(self) -> FloatArray:
+        """(n, 2) m2 per metre, variation of the visible exchange over p"""
+        return self._slope_p.live
+
+    @property
+    def slope_q(self) -> FloatArray:
+        """(n, 2) m2 per metre, variation of the visible exchange over q"""
+        return self._slope_q.live
+
+    @property
+    def residual_p(self) -> FloatArray:
+        """(n,) RMS deviation over p of the form factor to q from its linear fit"""
+        return self._residual_p.live
+
+    @property
+    def residual_q(self) -> FloatArray:
+        """(n,) RMS deviation over q of the form factor to p from its linear fit"""
+        return self._residual_q.live
 
     @property
     def blocker_start(self) -> Int64Array:
@@ -137,8 +158,10 @@ class LinkTable:
         self._samples.append(batch.samples)
         self._noise.append(batch.noise)
         self._kind.append(batch.kind)
-        self._deviation_p.append(batch.deviation_p)
-        self._deviation_q.append(batch.deviation_q)
+        self._slope_p.append(batch.slope_p)
+        self._slope_q.append(batch.slope_q)
+        self._residual_p.append(batch.residual_p)
+        self._residual_q.append(batch.residual_q)
         self._blocker_start.append(start)
         self._blocker_count.append(batch.blocker_count)
         self._pool.append(batch.blockers)
@@ -165,8 +188,10 @@ class LinkTable:
             self._samples,
             self._noise,
             self._kind,
-            self._deviation_p,
-            self._deviation_q,
+            self._slope_p,
+            self._slope_q,
+            self._residual_p,
+            self._residual_q,
             self._blocker_start,
             self._blocker_count,
         )

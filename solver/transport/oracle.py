@@ -1,26 +1,36 @@
 """Where refinement pays: each link's squared error, by the end whose subdivision would reduce it.
 
 Transport-based refinement [H 4.4.1], with errors as the squares that add up to the RMS error of the
-field. Light arriving at p over a link from q varies over p by B_q times the RMS deviation of the form
-factor over p (occlusion included, see `linking`): subdividing p resolves it. Light leaving p for q is
-taken as uniform over p: where it is not, and the form factor varies over p too, subdividing p resolves
-that. [H] splits the larger end; here the end with the larger error is split, which is the same for
-emitters and reflectors alike but never splits a uniform lamp in vain.
+field. Links carry linear functions (`pushpull`), so that errors come from what is not linear:
+
+* arriving: light from q falls on p with a residual that no linear function over p shows. Subdividing p
+  resolves it;
+* leaving: p sends q its mean and first moment; where its radiosity has a residual and the form factor
+  over p has one too, they may be correlated. Subdividing p resolves it;
+* sampling: the visible fraction is known from rays. More rays resolve it.
+
+Errors of links that share a receiver tend to have one sign (where two surfaces come close, links from
+all parts of the one err alike on the other), so that they are not independent: the sum over an element's
+links counts by `COHERENCE` as a sum of amplitudes and for the rest as one of squares. If it were squares
+alone, subdividing a source would seem to improve its receiver.
+
+[H] splits the larger end; here the end with the larger error is split, which is the same for emitters
+and reflectors alike but never splits a uniform lamp in vain.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from typing import Final
 
 import numpy as np
 
 from solver.kernels import kernel
+from solver.transport.variation import solve_moment
 from solver.types import FloatArray, Int64Array, IntArray
 from solver.visibility.fraction import STRATIFIED
 
-import os
-COHERENCE=float(os.environ.get('COH','0.5'))
 SPLIT_P: Final = 0
 SPLIT_Q: Final = 1
 RESAMPLE: Final = 2
@@ -29,6 +39,110 @@ RESAMPLE: Final = 2
 MAX_SAMPLES: Final = 64
 """Most samples a link takes, 16 rays each."""
 
+COHERENCE: Final = float(os.environ.get("COH", "0.3"))
+"""Part of the errors at one element that adds up by amplitude."""
+
+CORRELATION: Final = float(os.environ.get("COR", "0.5"))
+"""Of the residuals of radiosity and form factor over one element."""
+
+
+@kernel
+def arriving_amplitudes(
+    p: IntArray,
+    q: IntArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
+    reflectance: FloatArray,
+    radiosity: FloatArray,
+    amplitude: FloatArray,
+) -> None:
+    """Sum over its own links of the RMS radiosity that an element's (n,) function leaves out, W/m2."""
+    for e in range(len(amplitude)):
+        amplitude[e] = 0.0
+    for link in range(len(p)):
+        i = p[link]
+        j = q[link]
+        amplitude[i] += reflectance[i] * radiosity[j] * residual_p[link]
+        amplitude[j] += reflectance[j] * radiosity[i] * residual_q[link]
+
+
+@kernel
+def leaf_residuals(
+    parent: IntArray, area: FloatArray, amplitude: FloatArray, variance: FloatArray
+) -> None:
+    """Variance of the radiosity within each element (n,) that no linear function shows, (W/m2)^2.
+
+    What a link brings to an ancestor varies over a descendant in proportion to its length at most.
+    """
+    for e in range(len(variance)):
+        variance[e] = COHERENCE * amplitude[e] * amplitude[e]
+        if parent[e] >= 0:
+            variance[e] += variance[parent[e]] * area[e] / area[parent[e]]
+
+
+@kernel
+def element_residuals(
+    child: IntArray,
+    child_count: IntArray,
+    area: FloatArray,
+    moment: FloatArray,
+    offset: FloatArray,
+    moments: FloatArray,
+    variance: FloatArray,
+    spread: FloatArray,
+) -> None:
+    """RMS residual of the luminance radiosity over each element (n,) from its linear function.
+
+    moments (n, 3) are mean and first moments; variance (n,) what is unknown within each leaf.
+    """
+    for e in range(len(child) - 1, -1, -1):
+        a, b = solve_moment(moment[e], moments[e, 1], moments[e, 2])
+        linear = a * moments[e, 1] + b * moments[e, 2]
+        if child[e] < 0:
+            spread[e] = linear + variance[e]
+            continue
+        total = 0.0
+        for k in range(child[e], child[e] + child_count[e]):
+            total += area[k] * (spread[k] + (moments[k, 0] - moments[e, 0]) ** 2)
+        spread[e] = total / area[e]
+    # So far it is the whole variance; parents needed that of their children.
+    for e in range(len(child)):
+        a, b = solve_moment(moment[e], moments[e, 1], moments[e, 2])
+        linear = a * moments[e, 1] + b * moments[e, 2]
+        spread[e] = math.sqrt(max(0.0, spread[e] - linear))
+
+
+@kernel
+def leaving_bias(
+    p: IntArray,
+    q: IntArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
+    parent: IntArray,
+    child: IntArray,
+    child_count: IntArray,
+    area: FloatArray,
+    reflectance: FloatArray,
+    spread: FloatArray,
+    bias: FloatArray,
+) -> None:
+    """Mean radiosity error of each element (n,) if the residuals of all its sources err to one side, W/m2."""
+    for e in range(len(bias)):
+        bias[e] = 0.0
+    for link in range(len(p)):
+        i = p[link]
+        j = q[link]
+        bias[j] += CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
+        bias[i] += CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
+    for e in range(len(bias)):
+        if parent[e] >= 0:
+            bias[e] += bias[parent[e]]
+    for e in range(len(bias) - 1, -1, -1):
+        if child[e] >= 0:
+            bias[e] = 0.0
+            for k in range(child[e], child[e] + child_count[e]):
+                bias[e] += bias[k] * area[k] / area[e]
+
 
 @kernel
 def link_errors(
@@ -36,13 +150,14 @@ def link_errors(
     q: IntArray,
     open_exchange: FloatArray,
     noise: FloatArray,
-    deviation_p: FloatArray,
-    deviation_q: FloatArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
     area: FloatArray,
     reflectance: FloatArray,
     radiosity: FloatArray,
     spread: FloatArray,
     resolved: FloatArray,
+    amplitude: FloatArray,
     bias: FloatArray,
     start: int,
     stop: int,
@@ -53,8 +168,9 @@ def link_errors(
     """Squared luminance error, times area, that splitting p (error_p) or q (error_q) would resolve,
     or sampling the visibility more densely (error_v).
 
-    Per element: area (m2), luminance reflectance, mean luminance radiosity and its RMS spread over the
-    element as far as its descendants tell (W/m2). Outputs (n,) in (W/m2)^2 m2.
+    Per element: area (m2), luminance reflectance, mean luminance radiosity and its residual spread
+    (W/m2), the share of arriving residuals that counts, and the sums over its links of what arrives
+    and of what its sources err. Outputs (n,) in (W/m2)^2 m2.
     """
     for link in range(start, stop):
         i = p[link]
@@ -64,12 +180,22 @@ def link_errors(
             error_v[link] = noise[link] * link_weight(
                 open_exchange[link], area[i], area[j], reflectance[i], reflectance[j], radiosity[i], radiosity[j]
             )
-        arriving = reflectance[i] * radiosity[j] * deviation_p[link] * resolved[i]
-        leaving = COHERENCE * reflectance[j] * spread[i] * deviation_p[link] * (area[i] / area[j])
-        error_p[link] = area[i] * arriving * arriving + area[j] * leaving * bias[j]
-        arriving = reflectance[j] * radiosity[i] * deviation_q[link] * resolved[j]
-        leaving = COHERENCE * reflectance[i] * spread[j] * deviation_q[link] * (area[j] / area[i])
-        error_q[link] = area[j] * arriving * arriving + area[i] * leaving * bias[i]
+        arriving = reflectance[i] * radiosity[j] * residual_p[link]
+        leaving = CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
+        error_p[link] = area[i] * resolved[i] * _together(arriving, amplitude[i]) + area[j] * _together(
+            leaving, bias[j]
+        )
+        arriving = reflectance[j] * radiosity[i] * residual_q[link]
+        leaving = CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
+        error_q[link] = area[j] * resolved[j] * _together(arriving, amplitude[j]) + area[i] * _together(
+            leaving, bias[i]
+        )
+
+
+@kernel
+def _together(one: float, all_of_them: float) -> float:
+    """Share of one error in the squared sum of all at its element."""
+    return one * (COHERENCE * all_of_them + (1.0 - COHERENCE) * one)
 
 
 @kernel
@@ -127,91 +253,6 @@ def threshold_for_share(errors: FloatArray, resolved: float) -> float:
     from_top = np.cumsum(sums[::-1])
     slot = len(sums) - 1 - int(np.searchsorted(from_top, resolved))
     return float(2.0 ** ((max(slot, 0) - len(sums) // 2) / 4.0))
-
-
-@kernel
-def leaf_variance(
-    p: IntArray,
-    q: IntArray,
-    deviation_p: FloatArray,
-    deviation_q: FloatArray,
-    parent: IntArray,
-    area: FloatArray,
-    reflectance: FloatArray,
-    radiosity: FloatArray,
-    variance: FloatArray,
-) -> None:
-    """Variance of the luminance radiosity within each element, by what its links bring, (n,) (W/m2)^2.
-
-    Contributions of different links are taken as independent; what varies linearly over an ancestor
-    varies over a descendant in proportion to its length, so that variance is handed down by area.
-    """
-    for e in range(len(variance)):
-        variance[e] = 0.0
-    for link in range(len(p)):
-        i = p[link]
-        j = q[link]
-        variance[i] += (reflectance[i] * radiosity[j] * deviation_p[link]) ** 2
-        variance[j] += (reflectance[j] * radiosity[i] * deviation_q[link]) ** 2
-    for e in range(len(variance)):
-        if parent[e] >= 0:
-            variance[e] += variance[parent[e]] * area[e] / area[parent[e]]
-
-
-@kernel
-def element_spread(
-    child: IntArray,
-    child_count: IntArray,
-    area: FloatArray,
-    mean: FloatArray,
-    variance: FloatArray,
-    spread: FloatArray,
-) -> None:
-    """RMS spread of the radiosity over each element (n,): of the leaves below it and within them."""
-    for e in range(len(child) - 1, -1, -1):
-        if child[e] < 0:
-            spread[e] = math.sqrt(variance[e])
-            continue
-        total = 0.0
-        for k in range(child[e], child[e] + child_count[e]):
-            total += area[k] * (spread[k] * spread[k] + (mean[k] - mean[e]) ** 2)
-        spread[e] = math.sqrt(total / area[e])
-
-
-@kernel
-def coherent_bias(
-    p: IntArray,
-    q: IntArray,
-    deviation_p: FloatArray,
-    deviation_q: FloatArray,
-    parent: IntArray,
-    child: IntArray,
-    child_count: IntArray,
-    area: FloatArray,
-    reflectance: FloatArray,
-    spread: FloatArray,
-    bias: FloatArray,
-) -> None:
-    """Mean radiosity error of each element (n,) if the errors of unresolved sources all have one sign.
-
-    They tend to: where two surfaces come close both are brighter, or both darker, than on average, so
-    that taking either as uniform errs to the same side link after link.
-    """
-    for e in range(len(bias)):
-        bias[e] = 0.0
-    for link in range(len(p)):
-        i = p[link]
-        j = q[link]
-        bias[j] += COHERENCE * reflectance[j] * spread[i] * deviation_p[link] * (area[i] / area[j])
-        bias[i] += COHERENCE * reflectance[i] * spread[j] * deviation_q[link] * (area[j] / area[i])
-    for e in range(len(bias)):
-        if parent[e] >= 0:
-            bias[e] += bias[parent[e]]
-    for e in range(len(bias) - 1, -1, -1):
-        if child[e] >= 0:
-            bias[e] = 0.0
-            for k in range(child[e], child[e] + child_count[e]):
-                bias[e] += bias[k] * area[k] / area[e]
 
 
 @kernel

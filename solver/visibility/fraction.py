@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.types import BoolArray, Corners, Float32Array, FloatArray, IntArray, ByteArray
+from solver.types import BoolArray, Corners, Float32Array, FloatArray, IntArray, ByteArray, Points
 from solver.visibility.rays import RayScene
 from solver.visibility.sampling import hash_index, sample_by_solid_angle, sample_element
 
@@ -31,6 +31,9 @@ NEAR: Final = 2.0
 
 MISSED: Final = 0.2
 """Part of a sample that may be of the other kind than all that were taken."""
+
+STEP: Final = 0.25
+"""Share of the variance of a step that no linear function explains."""
 
 BATCH: Final = 1 << 17
 """Rays generated and traced at a time, which bounds memory."""
@@ -49,10 +52,14 @@ class VisibleFractions:
     """(n,) visible fraction of the exchange area"""
     noise: FloatArray
     """(n,) its expected squared error"""
-    spread_p: FloatArray
-    """(n,) squared deviation of the fraction between the quadrants of p"""
-    spread_q: FloatArray
-    """(n,) the same of q"""
+    lean_p: FloatArray
+    """(n, 2) covariance of visibility and position on p, m, by the axes of its patch; less noise"""
+    lean_q: FloatArray
+    """(n, 2) the same on q"""
+    residual_p: FloatArray
+    """(n,) squared deviation of the fraction over p from the linear function that `lean_p` tells"""
+    residual_q: FloatArray
+    """(n,) the same on q"""
 
 
 @kernel
@@ -101,6 +108,8 @@ def _generate(
     area: FloatArray,
     patch: IntArray,
     normals: FloatArray,
+    axes: FloatArray,
+    centroid: Points,
     center: FloatArray,
     scale: float,
     offset: float,
@@ -111,6 +120,7 @@ def _generate(
     directions: Float32Array,
     weights: FloatArray,
     strata: ByteArray,
+    places: Float32Array,
 ) -> None:
     """Rays of links [start, stop); row 0 of the outputs belongs to link `first`."""
     x = np.empty(3)
@@ -155,6 +165,8 @@ def _generate(
                     cosine1 / math.sqrt(square) if close else cosine1 * cosine2 / (square * square)
                 )
                 strata[ray] = near * 4 + far if swapped else far * 4 + near
+                _place(x, centroid[i], axes[patch[i]], places[ray, 2:] if swapped else places[ray, :2])
+                _place(y, centroid[j], axes[patch[j]], places[ray, :2] if swapped else places[ray, 2:])
                 for axis in range(3):
                     a = np.float32((x[axis] - center[axis]) * scale + offset * n1[axis])
                     b = np.float32((y[axis] - center[axis]) * scale + offset * n2[axis])
@@ -163,6 +175,7 @@ def _generate(
             else:
                 weights[ray] = 0.0
                 strata[ray] = 0
+                places[ray, :] = 0.0
                 for axis in range(3):
                     origins[ray, axis] = 0.0
                     directions[ray, axis] = 0.0
@@ -170,69 +183,104 @@ def _generate(
 
 
 @kernel
+def _place(x: FloatArray, centroid: FloatArray, axes: FloatArray, out: Float32Array) -> None:
+    """Coordinates of x (3,) from the centroid, by axes (2, 3)."""
+    for k in range(2):
+        total = 0.0
+        for axis in range(3):
+            total += (x[axis] - centroid[axis]) * axes[k, axis]
+        out[k] = total
+
+
+@kernel
 def _reduce(
     samples: int,
     first: int,
+    p: IntArray,
+    q: IntArray,
+    moment: FloatArray,
     start: int,
     stop: int,
     weights: FloatArray,
     strata: ByteArray,
+    places: Float32Array,
     blocked: BoolArray,
     visibility: FloatArray,
     noise: FloatArray,
-    spread_p: FloatArray,
-    spread_q: FloatArray,
+    lean_p: FloatArray,
+    lean_q: FloatArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
 ) -> None:
-    """Visible fraction, its squared error, and its squared deviation between the quadrants of either end."""
-    weight_p = np.empty(4)
-    weight_q = np.empty(4)
-    seen_p = np.empty(4)
-    seen_q = np.empty(4)
+    """Visible fraction, its squared error, and how it varies over either end."""
+    weight = np.empty((2, 4))
+    seen = np.empty((2, 4))
+    mean = np.empty(4)
+    seen_mean = np.empty(4)
     n = STRATA * samples
     for link in range(start, stop):
-        weight_p[:] = 0.0
-        weight_q[:] = 0.0
-        seen_p[:] = 0.0
-        seen_q[:] = 0.0
+        weight[:] = 0.0
+        seen[:] = 0.0
+        mean[:] = 0.0
+        seen_mean[:] = 0.0
         base = (link - first) * n
-        seen_square = 0.0
+        total = 0.0
         square = 0.0
+        seen_total = 0.0
+        seen_square = 0.0
         for ray in range(base, base + n):
             w = weights[ray]
             a = strata[ray] & 3
             b = strata[ray] >> 2
-            weight_p[a] += w
-            weight_q[b] += w
+            total += w
             square += w * w
+            weight[0, a] += w
+            weight[1, b] += w
+            for k in range(4):
+                mean[k] += w * places[ray, k]
             if not blocked[ray]:
+                seen_total += w
                 seen_square += w * w
-                seen_p[a] += w
-                seen_q[b] += w
-        total = weight_p.sum()
-        seen = seen_p.sum()
-        spread_p[link] = 0.0
-        spread_q[link] = 0.0
+                seen[0, a] += w
+                seen[1, b] += w
+                for k in range(4):
+                    seen_mean[k] += w * places[ray, k]
+        lean_p[link, :] = 0.0
+        lean_q[link, :] = 0.0
         if total <= 0.0:
             visibility[link] = 0.5
             noise[link] = 0.25
+            residual_p[link] = 0.25
+            residual_q[link] = 0.25
             continue
-        v = seen / total
+        v = seen_total / total
         visibility[link] = v
         # Of a ratio of sums, to first order; and one sample of the other kind may have been missed.
         scatter = ((1.0 - 2.0 * v) * seen_square + v * v * square) / (total * total)
         effective = total * total / square
         missed = MISSED / (effective + 1.0)
         noise[link] = STRATIFIED * (max(0.0, scatter) + missed * missed)
-        # Between-quadrant variance less what 4 samples a quadrant scatter by themselves, and at least
-        # the error of the whole estimate.
-        scattered = 0.75 * v * (1.0 - v) * 4.0 / effective
-        for k in range(4):
-            if weight_p[k] > 0.0:
-                spread_p[link] += weight_p[k] / total * (seen_p[k] / weight_p[k] - v) ** 2
-            if weight_q[k] > 0.0:
-                spread_q[link] += weight_q[k] / total * (seen_q[k] / weight_q[k] - v) ** 2
-        spread_p[link] = max(spread_p[link] - scattered, 0.25 * scattered)
-        spread_q[link] = max(spread_q[link] - scattered, 0.25 * scattered)
+        scattered = STRATIFIED * v * (1.0 - v) / effective
+        for end in range(2):
+            # Between-quadrant variance less what a quarter of the samples scatter by themselves, and at
+            # least the error of the whole estimate.
+            spread = 0.0
+            for k in range(4):
+                if weight[end, k] > 0.0:
+                    spread += weight[end, k] / total * (seen[end, k] / weight[end, k] - v) ** 2
+            spread = max(spread - 3.0 * scattered, 0.5 * scattered)
+            # The linear part, shrunk by what noise alone would give.
+            u0 = (seen_mean[2 * end] - v * mean[2 * end]) / total
+            v0 = (seen_mean[2 * end + 1] - v * mean[2 * end + 1]) / total
+            s = moment[q[link]] if end == 1 else moment[p[link]]
+            determinant = s[0] * s[2] - s[1] * s[1]
+            linear = (s[2] * u0 * u0 - 2.0 * s[1] * u0 * v0 + s[0] * v0 * v0) / determinant
+            keep = max(0.0, 1.0 - 2.0 * scattered / linear) if linear > 0.0 else 0.0
+            lean = lean_q if end == 1 else lean_p
+            lean[link, 0] = keep * u0
+            lean[link, 1] = keep * v0
+            residual = residual_q if end == 1 else residual_p
+            residual[link] = max(spread - keep * linear, STEP * spread)
 
 
 def visible_fractions(
@@ -244,15 +292,20 @@ def visible_fractions(
     area: FloatArray,
     patch: IntArray,
     normals: FloatArray,
+    axes: FloatArray,
+    centroid: Points,
+    moment: FloatArray,
     samples: int = 1,
 ) -> VisibleFractions:
     """Visible fractions of element pairs p, q (n,), of the light paths between them, by 16 `samples` rays each.
 
-    corners (m, 4, 3), counts (m,), area (m,), patch (m,) are the elements',
-    normals (k, 3) the patches'.
+    corners (m, 4, 3), counts (m,), area (m,), patch (m,), centroid (m, 3) and second moments (m, 3) are the
+    elements', normals (k, 3) and axes (k, 2, 3) the patches'.
     """
     n = len(p)
-    result = VisibleFractions(np.empty(n), np.empty(n), np.empty(n), np.empty(n))
+    result = VisibleFractions(
+        np.empty(n), np.empty(n), np.empty((n, 2)), np.empty((n, 2)), np.empty(n), np.empty(n)
+    )
     links_at_once = max(1, BATCH // (STRATA * samples))
     for first in range(0, n, links_at_once):
         last = min(first + links_at_once, n)
@@ -261,6 +314,7 @@ def visible_fractions(
         directions = np.empty((count, 3), dtype=np.float32)
         weights = np.empty(count)
         strata = np.empty(count, dtype=np.uint8)
+        places = np.empty((count, 4), dtype=np.float32)
 
         def generate(
             start: int,
@@ -270,6 +324,7 @@ def visible_fractions(
             directions: Float32Array = directions,
             weights: FloatArray = weights,
             strata: ByteArray = strata,
+            places: Float32Array = places,
         ) -> None:
             _generate(
                 p,
@@ -280,6 +335,8 @@ def visible_fractions(
                 area,
                 patch,
                 normals,
+                axes,
+                centroid,
                 rays.center,
                 rays.scale,
                 rays.offset,
@@ -290,6 +347,7 @@ def visible_fractions(
                 directions,
                 weights,
                 strata,
+                places,
             )
 
         run_chunks(generate, last - first, _CHUNK)
@@ -297,14 +355,20 @@ def visible_fractions(
         _reduce(
             samples,
             first,
+            p,
+            q,
+            moment,
             first,
             last,
             weights,
             strata,
+            places,
             blocked,
             result.visibility,
             result.noise,
-            result.spread_p,
-            result.spread_q,
+            result.lean_p,
+            result.lean_q,
+            result.residual_p,
+            result.residual_q,
         )
     return result

@@ -1,0 +1,116 @@
+"""Refinement: the worst links are split or sampled more densely ([H 4.4.1])."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver.transport.estimate import ErrorEstimate
+from solver.transport.field import SolveOutcome
+from solver.transport.linking import Light, Linker
+from solver.transport.links import LinkBatch
+from solver.transport.oracle import MAX_SAMPLES, RESAMPLE, SPLIT_P, SPLIT_Q, child_pairs, threshold_for_share
+from solver.transport.settings import SolverSettings
+from solver.transport.state import TransportState
+from solver.types import BoolArray, IntArray
+
+PAIRS_AT_ONCE: Final = 2048
+"""Links evaluated between two yields."""
+
+NOISE_SHARE: Final = 0.5
+"""Noise that fresh links may have, of the least error that is refined in the same round."""
+
+DEFAULT_MINIMUM_AREA: Final = 1e-8
+"""Smallest element by default, relative to the squared size of the scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Links to refine, and how."""
+
+    links: IntArray
+    """(m,)"""
+    action: IntArray
+    """(m,)"""
+    bound: float
+    """the least squared error among them"""
+
+
+def choose(
+    state: TransportState, estimate: ErrorEstimate, settings: SolverSettings, resolve: float
+) -> Choice | SolveOutcome:
+    """The worst links, until `resolve` of the squared error is dealt with; or why nothing can be done."""
+    links = state.links
+    errors = estimate.links
+    if settings.transport_error is not None:
+        errors[:2, estimate.irradiance <= settings.transport_error] = 0.0
+        if float(errors.sum()) <= 1e-3 * resolve:
+            return SolveOutcome.TRANSPORT_ERROR
+    errors[SPLIT_P, ~_splittable(state, settings, links.p)] = 0.0
+    errors[SPLIT_Q, ~_splittable(state, settings, links.q)] = 0.0
+    errors[RESAMPLE, links.samples >= MAX_SAMPLES] = 0.0
+    action = np.argmax(errors, axis=0).astype(np.int32)
+    worth = errors.max(axis=0)
+    total = float(worth.sum())
+    if total <= 1e-3 * resolve:
+        return SolveOutcome.MINIMUM_AREA
+    bound = threshold_for_share(worth, min(resolve, 0.9 * total))
+    chosen = np.flatnonzero(worth >= bound)
+    if len(links) + 3 * len(chosen) > settings.max_links:
+        return SolveOutcome.LINK_LIMIT
+    action = action[chosen]
+    split = np.where(action == SPLIT_P, links.p[chosen], links.q[chosen])
+    ends = np.unique(split[action != RESAMPLE])
+    if len(state.tree) + 4 * int((state.tree.child[ends] < 0).sum()) > settings.max_elements:
+        return SolveOutcome.ELEMENT_LIMIT
+    return Choice(chosen.astype(np.int32), action, bound)
+
+
+def refine(state: TransportState, linker: Linker, light: Light, choice: Choice) -> Iterator[LinkBatch]:
+    """Replace the chosen links by better ones; yields the batches as they are made."""
+    tree, links = state.tree, state.links
+    chosen, action = choice.links, choice.action
+    p, q, samples = links.p[chosen], links.q[chosen], links.samples[chosen]
+    split = np.where(action == SPLIT_P, p, q)
+    ends = np.unique(split[action != RESAMPLE])
+    before = len(tree)
+    state.split(ends[tree.child[ends] < 0])
+    parent = tree.parent[before:]
+    light = Light(
+        np.concatenate([light.radiosity, light.radiosity[parent]]),
+        np.concatenate([light.reflectance, light.reflectance[parent]]),
+        NOISE_SHARE * choice.bound,
+    )
+    rows = np.where(action == RESAMPLE, 1, tree.child_count[split]).astype(np.int64)
+    slot = np.cumsum(rows) - rows
+    total = int(rows.sum())
+    new_p, new_q, origin = (np.empty(total, dtype=np.int32) for _ in range(3))
+    child_pairs(p, q, action, tree.child, tree.child_count, slot, new_p, new_q, origin)
+    least = np.where(action == RESAMPLE, 4 * samples, 1).astype(np.int32)
+    start, count, pool = links.blocker_start[chosen], links.blocker_count[chosen], links.pool
+    batches = []
+    for first in range(0, total, PAIRS_AT_ONCE):
+        part = slice(first, first + PAIRS_AT_ONCE)
+        source = origin[part]
+        batches.append(
+            linker.link_children(
+                tree, new_p[part], new_q[part], start[source], count[source], pool, least[source], light
+            )
+        )
+        yield batches[-1]
+    gone = np.zeros(len(links), dtype=bool)
+    gone[chosen] = True
+    links.remove(gone)
+    for batch in batches:
+        links.append(batch)
+
+
+def _splittable(state: TransportState, settings: SolverSettings, elements: IntArray) -> BoolArray:
+    tree = state.tree
+    minimum = settings.minimum_area
+    if minimum is None:
+        minimum = DEFAULT_MINIMUM_AREA * state.surfaces.size**2
+    return np.asarray((tree.child[elements] >= 0) | (tree.area[elements] >= 2.0 * minimum))

@@ -1,0 +1,98 @@
+"""What a solve works on: the element tree, the links, and the light on them as functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
+from solver.transport.elements import ElementTree
+from solver.transport.links import LinkTable
+from solver.transport.pushpull import irradiance
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Spectra
+
+
+@dataclass(eq=False)
+class TransportState:
+    """Elements, links, and linear functions (n, 3, channels) on the n elements.
+
+    Only the rows of leaves are meaningful in `radiosity`.
+    """
+
+    surfaces: Surfaces
+    tree: ElementTree
+    links: LinkTable
+    weights: FloatArray
+    """(channels,) of luminance"""
+    emission: Spectra
+    """(p, channels) W/m2, of the patches"""
+    reflectance: Spectra
+    """(p, channels)"""
+    radiosity: FloatArray
+    """(n, 3, channels) W/m2, and W/m2 per metre"""
+    received: FloatArray
+    """(n, 3, channels) irradiance: W/m2, and W/m2 per metre"""
+    closure: FloatArray
+    """(n,) scale of what each leaf sends and receives"""
+    remainder: FloatArray
+    """(n, 3) coupling of each leaf with itself"""
+    gathers: int = 0
+
+    @staticmethod
+    def of(surfaces: Surfaces) -> TransportState:
+        """Patches as the first elements; no light has moved, and the ambient term stands for it."""
+        n = surfaces.patch_count
+        channels = 1 if surfaces.is_grey else 3
+        emission = np.ascontiguousarray(surfaces.emission[:, :channels])
+        reflectance = np.ascontiguousarray(surfaces.reflectance[:, :channels])
+        radiosity, received = np.zeros((2, n, 3, channels))
+        radiosity[:, 0] = emission
+        received[:, 0] = _ambient(surfaces.area, emission, reflectance)
+        return TransportState(
+            surfaces=surfaces,
+            tree=ElementTree(surfaces),
+            links=LinkTable(),
+            weights=np.ones(1) if channels == 1 else LUMINANCE_WEIGHTS,
+            emission=emission,
+            reflectance=reflectance,
+            radiosity=radiosity,
+            received=received,
+            closure=np.ones(n),
+            remainder=np.zeros((n, 3)),
+        )
+
+    @property
+    def channels(self) -> int:
+        """1 in a grey scene, 3 otherwise."""
+        return self.emission.shape[1]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held, those of the settling included."""
+        return self.tree.nbytes + self.links.nbytes + 7 * self.radiosity.nbytes
+
+    def gather(self, radiosity: FloatArray) -> FloatArray:
+        """Irradiance functions (n, 3, channels) from the leaf radiosities (n, 3, channels)."""
+        self.gathers += 1
+        return irradiance(self.tree, self.links, self.closure, self.remainder, radiosity)
+
+    def split(self, ids: IntArray) -> None:
+        """Subdivide leaves; the children start with their parent's light."""
+        before = len(self.tree)
+        self.tree.split(ids)
+        parent = self.tree.parent[before:]
+        offset = self.tree.offset[before:]
+        for name in ("radiosity", "received"):
+            functions: FloatArray = getattr(self, name)
+            fresh = functions[parent]
+            fresh[:, 0] += np.einsum("nk,nkc->nc", offset, fresh[:, 1:])
+            setattr(self, name, np.concatenate([functions, fresh]))
+
+
+def _ambient(area: FloatArray, emission: Spectra, reflectance: Spectra) -> FloatArray:
+    """Mean irradiance (channels,) of the scene if it were one well-mixed enclosure."""
+    total = max(float(area.sum()), 1e-300)
+    emitted = (area[:, None] * emission).sum(axis=0) / total
+    absorbed = 1.0 - (area[:, None] * reflectance).sum(axis=0) / total
+    return np.asarray(emitted / absorbed)
