@@ -43,8 +43,8 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
     problems.install(app)
     app.include_router(pages.router)
     for routes in (scenes, session_routes, edits, frames, probe, events, later):
-        app.include_router(routes.router, prefix="/v1", dependencies=[Depends(require_token)])
-    app.include_router(later.sockets, prefix="/v1")
+        app.include_router(routes.router, dependencies=[Depends(require_token)])
+    app.include_router(later.sockets)
     describe(app)
     return app
 

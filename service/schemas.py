@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -70,6 +70,12 @@ class SessionStatus(BaseModel):
             warnings=list(status.warnings),
             settings=SettingsDocument.describing(status.settings),
         )
+
+    @classmethod
+    def lost(cls, session_id: str, last: EngineStatus) -> SessionStatus:
+        """The wire's form of the last status of a session whose worker has ended."""
+        warnings = (*last.warnings, "The worker of this session has ended: delete it and post it anew.")
+        return cls.of(session_id, replace(last, state=SessionState.FAILED, warnings=warnings))
 
 
 class SessionList(BaseModel):

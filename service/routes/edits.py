@@ -11,7 +11,7 @@ from service.problems import responses
 from service.schemas import EditBatch, EditsAnswer, LogEntry
 from solver.errors import LimitExceededError
 
-router = APIRouter(tags=["edits"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1", tags=["edits"], route_class=JsonRoute)
 
 
 @router.post("/sessions/{id}/edits", responses=responses(404, 409, 413, 422, 503))

@@ -14,7 +14,7 @@ from service.hosting.sessions import Session
 from service.problems import responses
 from service.schemas import SessionStatus
 
-router = APIRouter(tags=["sessions"])
+router = APIRouter(prefix="/v1", tags=["sessions"])
 
 
 def living(session: UsedSession) -> Session:

@@ -13,7 +13,7 @@ from service.hosting.messages import FrameAnswer, GetFrame
 from service.negotiation import MEDIA_TYPES, choose_format, known_tags
 from service.problems import responses
 
-router = APIRouter(tags=["frames"])
+router = APIRouter(prefix="/v1", tags=["frames"])
 
 _HEADERS: Final = {
     "ETag": {"description": "Names this very picture.", "schema": {"type": "string"}},

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Depends, WebSocket
 from service.context import session_of
 from service.problems import NOT_AVAILABLE, ProblemError, respond
 
-router = APIRouter(include_in_schema=False)
-sockets = APIRouter()
+router = APIRouter(prefix="/v1", include_in_schema=False)
+sockets = APIRouter(prefix="/v1")
 _of_session = [Depends(session_of)]
 
 

@@ -12,7 +12,7 @@ from service.problems import responses
 from service.schemas import ProbeAnswer, ProbeRequest
 from solver.errors import LimitExceededError
 
-router = APIRouter(tags=["measurements"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1", tags=["measurements"], route_class=JsonRoute)
 
 
 @router.post("/sessions/{id}/probe", responses=responses(404, 413, 422, 503))

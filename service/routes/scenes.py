@@ -10,7 +10,7 @@ from service.json_body import JsonRoute
 from service.schemas import SampleList, SampleScene
 from solver.document.samples import load_sample, sample_names
 
-router = APIRouter(tags=["scenes"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1", tags=["scenes"], route_class=JsonRoute)
 
 
 @router.get("/scenes")

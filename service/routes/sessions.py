@@ -19,7 +19,7 @@ from solver.document.settings import SettingsDocument
 from solver.errors import SceneError
 from solver.geometry.scene import Scene
 
-router = APIRouter(tags=["sessions"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1", tags=["sessions"], route_class=JsonRoute)
 
 
 @router.post("/sessions", status_code=201, responses=responses(413, 422, 429, 503))
@@ -56,7 +56,9 @@ async def list_sessions(context: Ctx) -> SessionList:
     """The sessions that the service holds."""
     return SessionList(
         sessions=[
-            SessionStatus.of(session.id, status)
+            SessionStatus.lost(session.id, status)
+            if session.worker.gone
+            else SessionStatus.of(session.id, status)
             for session in context.sessions
             if (status := session.worker.status) is not None
         ]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +15,7 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.config import ServiceSettings
+from service.hosting import remote
 from tests.engine.scenes import box_document
 from tests.service.conftest import LOOSE, context_of, open_box
 from tests.service.problem import fields_at_fault, problem_of
@@ -187,6 +191,8 @@ def test_an_idle_session_expires() -> None:
         while client.get("/v1/sessions").json()["sessions"] and time.monotonic() < deadline:
             time.sleep(0.05)
         problem_of(client.get(path), 404)
+        while is_running(pid) and time.monotonic() < deadline:
+            time.sleep(0.05)
         assert not is_running(pid)
 
 
@@ -210,3 +216,16 @@ def test_a_token_is_asked_for_where_there_is_one() -> None:
             assert client.get(path, headers={"Authorization": "Bearer secret"}).status_code == 200
         assert client.get("/healthz").status_code == 200
         assert client.get("/").status_code == 200
+
+
+def test_a_worker_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def spawn(theirs: socket.socket) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", "pass"])
+
+    monkeypatch.setattr(remote, "_spawn", spawn)
+    with service(pool_size=0) as client:
+        answer = client.post("/v1/sessions", json={"scene": {}})
+        assert "could not be started" in problem_of(answer, 503)["detail"]
+        assert client.get("/v1/sessions").json() == {"sessions": []}
+    with pytest.raises(remote.WorkerNotStartedError), service(pool_size=1):
+        pass
