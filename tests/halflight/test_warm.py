@@ -7,30 +7,40 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from tests.halflight.commands import ROOT, invoke, run
 
 SESSION = """
-import json, sys
-import numba.core.event
+import gc, json, sys
+from numba.core.dispatcher import Dispatcher
 
-class Compilations(numba.core.event.Listener):
-    def __init__(self):
-        self.names = []
-    def on_start(self, event):
-        self.names.append(event.data["dispatcher"].py_func.__qualname__)
-    def on_end(self, event):
-        pass
+def kernels():
+    # Compiled or loaded: either way somebody has waited for it.
+    return {
+        f"{kernel.py_func.__qualname__}{signature}"
+        for kernel in gc.get_objects()
+        if isinstance(kernel, Dispatcher) and kernel.py_func.__module__.startswith("solver.")
+        for signature in kernel.signatures
+    }
 
-compilations = Compilations()
+def compiled():
+    # Of those, what was not found on disk.
+    return {
+        f"{kernel.py_func.__qualname__}{signature}"
+        for kernel in gc.get_objects()
+        if isinstance(kernel, Dispatcher) and kernel.py_func.__module__.startswith("solver.")
+        for signature in kernel.stats.cache_misses
+    }
+
 from solver.engine.drawing import Drawing
 from solver.engine.warm import warm_up
 drawing = Drawing()
 if sys.argv[1] == "warm first":
     warm_up(drawing)
-numba.core.event.register("numba:compile", compilations)
+warm = kernels()
 
 import numpy as np
 from solver.document.edits import RemoveEdit, SetMaterialEdit
@@ -66,12 +76,24 @@ for sample in ("cube_room", "office"):
             SetMaterialEdit(op="set_material", id="lamp", material=warm_light),
             RemoveEdit(op="remove", id=next(reversed(engine.scene.objects))),
         ])
-print(json.dumps({"frames": frames, "compiled": compilations.names}))
+print(json.dumps({"frames": frames, "warm": len(warm), "added": sorted(kernels() - warm),
+                  "compiled": sorted(compiled())}))
 """
 
 
-def session(mode: str, **environment: str) -> list[str]:
-    """Names of the kernels that sessions of a process had to compile."""
+class Session(NamedTuple):
+    """The kernels that sessions of a process waited for."""
+
+    warm: int
+    """How many there were before"""
+    added: list[str]
+    """Those that `warm_up` had not called"""
+    compiled: list[str]
+    """Those that were not on disk, before or in the session"""
+
+
+def session(mode: str, **environment: str) -> Session:
+    """Solve, edit, draw, trace and probe in a process of its own."""
     done = subprocess.run(
         [sys.executable, "-c", SESSION, mode],
         cwd=ROOT,
@@ -83,12 +105,13 @@ def session(mode: str, **environment: str) -> list[str]:
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout.splitlines()[-1])
     assert result["frames"] >= 2 * 2 * 17, "flat and gouraud in every layer, and paths"
-    names: list[str] = result["compiled"]
-    return names
+    return Session(result["warm"], result["added"], result["compiled"])
 
 
-def test_nothing_is_compiled_after_warming_up() -> None:
-    assert session("warm first") == []
+def test_warming_up_calls_every_kernel_that_a_session_calls() -> None:
+    told = session("warm first")
+    assert told.warm > 50
+    assert told.added == []
 
 
 def test_warm_says_when_it_is_done() -> None:
@@ -103,11 +126,11 @@ def test_warm_on_a_fresh_machine_keeps_all_for_later_processes(tmp_path: Path) -
     """With an empty cache: the command, then a session in another process that does not warm up itself."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path)}
     before = session("not warmed", NUMBA_CACHE_DIR=str(tmp_path / "other"))
-    assert len(before) > 20, "the listener hears of kernels that are compiled"
+    assert len(before.compiled) > 20, "without the command, sessions compile"
     status, _, errors = run("warm", **cache)
     assert (status, errors) == (0, "")
     kept = {file.name for file in tmp_path.rglob("*.nbc")}
-    assert session("not warmed", **cache) == []
+    assert session("not warmed", **cache).compiled == []
     status, _, _ = run("warm", **cache)
     assert status == 0
     assert {file.name for file in tmp_path.rglob("*.nbc")} == kept, "a second time adds nothing"
