@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,7 +23,7 @@ from solver.transport.pushpull import pull
 from solver.transport.state import TransportState
 from solver.types import FloatArray
 
-LEAF: Final = float(os.environ.get("LEAF", "0.1"))
+LEAF: Final = 0.1
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
 
 

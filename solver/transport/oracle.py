@@ -10,9 +10,9 @@ field. Links carry linear functions (`pushpull`), so that errors come from what 
 * sampling: the visible fraction is known from rays. More rays resolve it.
 
 Errors of links that share a receiver tend to have one sign (where two surfaces come close, links from
-all parts of the one err alike on the other), so that they are not independent: the sum over an element's
-links counts by `COHERENCE` as a sum of amplitudes and for the rest as one of squares. If it were squares
-alone, subdividing a source would seem to improve its receiver.
+all parts of the one err alike on the other), so that they add up by amplitude at each element, and by
+squares over elements and levels. If they added up by squares alone, subdividing a source would seem to
+improve its receiver.
 
 [H] splits the larger end; here the end with the larger error is split, which is the same for emitters
 and reflectors alike but never splits a uniform lamp in vain.
@@ -21,7 +21,6 @@ and reflectors alike but never splits a uniform lamp in vain.
 from __future__ import annotations
 
 import math
-import os
 from typing import Final
 
 import numpy as np
@@ -39,10 +38,7 @@ RESAMPLE: Final = 2
 MAX_SAMPLES: Final = 64
 """Most samples a link takes, 16 rays each."""
 
-COHERENCE: Final = float(os.environ.get("COH", "0.3"))
-"""Part of the errors at one element that adds up by amplitude."""
-
-CORRELATION: Final = float(os.environ.get("COR", "0.5"))
+CORRELATION: Final = 0.5
 """Of the residuals of radiosity and form factor over one element."""
 
 
@@ -75,7 +71,7 @@ def leaf_residuals(
     What a link brings to an ancestor varies over a descendant in proportion to its length at most.
     """
     for e in range(len(variance)):
-        variance[e] = COHERENCE * amplitude[e] * amplitude[e]
+        variance[e] = amplitude[e] * amplitude[e]
         if parent[e] >= 0:
             variance[e] += variance[parent[e]] * area[e] / area[parent[e]]
 
@@ -180,22 +176,12 @@ def link_errors(
             error_v[link] = noise[link] * link_weight(
                 open_exchange[link], area[i], area[j], reflectance[i], reflectance[j], radiosity[i], radiosity[j]
             )
-        arriving = reflectance[i] * radiosity[j] * residual_p[link]
-        leaving = CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
-        error_p[link] = area[i] * resolved[i] * _together(arriving, amplitude[i]) + area[j] * _together(
-            leaving, bias[j]
-        )
-        arriving = reflectance[j] * radiosity[i] * residual_q[link]
-        leaving = CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
-        error_q[link] = area[j] * resolved[j] * _together(arriving, amplitude[j]) + area[i] * _together(
-            leaving, bias[i]
-        )
-
-
-@kernel
-def _together(one: float, all_of_them: float) -> float:
-    """Share of one error in the squared sum of all at its element."""
-    return one * (COHERENCE * all_of_them + (1.0 - COHERENCE) * one)
+        arriving = reflectance[i] * radiosity[j] * residual_p[link] * amplitude[i]
+        leaving = CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j]) * bias[j]
+        error_p[link] = area[i] * resolved[i] * arriving + area[j] * leaving
+        arriving = reflectance[j] * radiosity[i] * residual_q[link] * amplitude[j]
+        leaving = CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
+        error_q[link] = area[j] * resolved[j] * arriving + area[i] * leaving
 
 
 @kernel
