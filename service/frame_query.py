@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from service.negotiation import FrameFormat
-from solver.document.fields import MAX_COORDINATE
+from solver.document.fields import LEAST_FIELD_OF_VIEW, LEAST_LENGTH, MAX_COORDINATE
 from solver.engine.requests import (
     CameraChoice,
     Encoding,
@@ -45,7 +45,7 @@ def _point(text: str) -> str:
 
 
 def _direction(text: str) -> str:
-    if not any(_triple(text)):
+    if max(map(abs, _triple(text))) < LEAST_LENGTH:
         raise PydanticCustomError("zero_vector", "a direction of length 0 points nowhere")
     return text
 
@@ -93,7 +93,7 @@ class FrameQuery(BaseModel):
     vertical_fov: float | None = Field(
         default=None,
         allow_inf_nan=False,
-        gt=0.0,
+        ge=LEAST_FIELD_OF_VIEW,
         lt=180.0,
         description="Full vertical angle of view, degrees.",
     )

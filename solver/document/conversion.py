@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver import tolerances
-from solver.document.fields import MAX_COORDINATE, Location
+from solver.document.fields import LEAST_LENGTH, MAX_COORDINATE, Location
 from solver.document.framing import middle, overview
 from solver.document.models import (
     CameraDocument,
@@ -119,7 +119,7 @@ def up_of(eye: Vector, target: Vector, up: Sequence[float] | None, where: Locati
 
     Raises SceneError where there is no direction to look in, or it is along `up`.
     """
-    if np.array_equal(eye, target):
+    if np.abs(target - eye).max() < LEAST_LENGTH:
         raise SceneError("the target is where the eye is", (*where, "target"))
     if up is None:
         return _Z if not is_parallel(target - eye, _Z) else _Y

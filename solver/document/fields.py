@@ -18,6 +18,12 @@ MAX_COORDINATE: Final = 1e9
 MAX_EMISSION: Final = 1e12
 """W/m2: four orders of magnitude above the surface of the Sun."""
 
+LEAST_LENGTH: Final = 1e-100
+"""Shorter vectors, and quaternions, have no direction: their squares lose their digits, or are 0."""
+
+LEAST_FIELD_OF_VIEW: Final = 1e-3
+"""Degrees: 17 mm seen from a kilometre."""
+
 MAX_FACE_CORNERS: Final = 4096
 
 _LEAST_DETERMINANT: Final = 1e-12
@@ -41,7 +47,7 @@ def _nonzero_parts(scale: list[float]) -> list[float]:
 
 
 def _has_length(rotation: list[float]) -> list[float]:
-    if float(np.linalg.norm(rotation)) == 0.0:
+    if float(np.linalg.norm(rotation)) < LEAST_LENGTH:
         raise PydanticCustomError("zero_quaternion", "a quaternion of length 0 is not a rotation")
     return rotation
 
@@ -57,7 +63,7 @@ def _affine(matrix: list[float]) -> list[float]:
 
 
 def _distinct_from_zero(vector: list[float]) -> list[float]:
-    if not any(vector):
+    if max(map(abs, vector)) < LEAST_LENGTH:
         raise PydanticCustomError("zero_vector", "a direction of length 0 points nowhere")
     return vector
 
@@ -93,7 +99,9 @@ Matrix: TypeAlias = Annotated[list[Coordinate], Field(min_length=16, max_length=
 Index: TypeAlias = Annotated[int, Field(strict=True, ge=0, lt=2**31)]
 Face: TypeAlias = Annotated[list[Index], Field(min_length=3, max_length=MAX_FACE_CORNERS)]
 Identifier: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
-FieldOfView: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, lt=180.0)]
+FieldOfView: TypeAlias = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, ge=LEAST_FIELD_OF_VIEW, lt=180.0)
+]
 Extent: TypeAlias = Annotated[int, Field(strict=True, ge=1, lt=2**31)]
 """Pixels; how many may be asked for is the host's limit."""
 

@@ -76,7 +76,7 @@ def test_requests_of_the_description(
 
     @QUICK
     @given(case=SCHEMA[template][method].as_strategy(generation_mode=mode))
-    def run(case: schemathesis.Case) -> None:
+    def run(case: schemathesis.Case[Any]) -> None:
         place = case.formatted_path if method == "DELETE" else template.replace("/v1/sessions/{id}", path)
         sent: dict[str, Any] = {}
         if isinstance(case.body, bytes):

@@ -43,6 +43,7 @@ def test_a_probe_of_no_points_is_empty(client: TestClient, settled: str) -> None
         ({"position": [0, 0], "normal": [0, 0, 1]}, ["position"]),
         ({"position": [0, 0, "0"], "normal": [0, 0, 1]}, ["position", 2]),
         ({"position": [0, 0, 0], "normal": [0, 0, 0]}, ["normal"]),
+        ({"position": [0, 0, 0], "normal": [0, 0, 5e-324]}, ["normal"]),
         ({"position": [0, 0, 1e300], "normal": [0, 0, 1]}, ["position", 2]),
         ({"position": [0, 0, 0], "normal": [0, 0, 1], "size": 1}, ["size"]),
     ],

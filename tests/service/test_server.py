@@ -173,7 +173,7 @@ def test_sessions_are_solved_side_by_side(service: Service) -> None:
 def test_an_edit_is_answered_while_a_frame_waits_for_the_solve(service: Service) -> None:
     path = service.open(ENDLESS)
     frames: list[httpx.Response] = []
-    query = {"wait": "converged", "timeout_ms": 1500}
+    query: dict[str, str | int] = {"wait": "converged", "timeout_ms": 1500}
     waiting = threading.Thread(target=lambda: frames.append(service.http.get(f"{path}/frame", params=query)))
     waiting.start()
     for revision in range(2, 7):

@@ -206,7 +206,7 @@ def test_a_used_session_does_not_expire() -> None:
 
 
 def test_a_token_is_asked_for_where_there_is_one() -> None:
-    with TestClient(create_app(ServiceSettings(token="secret", pool_size=0))) as client:  # type: ignore[arg-type]
+    with TestClient(create_app(ServiceSettings(token="secret", pool_size=0))) as client:
         for path in ("/v1/sessions", "/v1/scenes", "/metrics"):
             answer = client.get(path)
             assert problem_of(answer, 401)["type"] == "urn:halflight:unauthorized"
