@@ -123,3 +123,41 @@ def _build(
                 after += 1
         skip[node] = after
     return used
+
+
+@kernel
+def walk_hierarchy(
+    low: FloatArray,
+    high: FloatArray,
+    skip: IntArray,
+    leaf_first: IntArray,
+    leaf_count: IntArray,
+    order: IntArray,
+    planes: FloatArray,
+    plane_count: int,
+    tolerance: float,
+    out: IntArray,
+) -> int:
+    """Polygons in leaves whose box reaches into the shaft, into `out`; returns their number."""
+    found = 0
+    node = 0
+    while node < len(skip):
+        missed = False
+        for p in range(plane_count):
+            # The box corner furthest along the plane's normal decides.
+            reach = 0.0
+            for axis in range(3):
+                c = planes[p, axis]
+                reach += c * (high[node, axis] if c > 0.0 else low[node, axis])
+            if reach - planes[p, 3] <= tolerance:
+                missed = True
+                break
+        if missed:
+            node = skip[node]
+            continue
+        if leaf_first[node] >= 0:
+            for k in range(leaf_first[node], leaf_first[node] + leaf_count[node]):
+                out[found] = order[k]
+                found += 1
+        node += 1
+    return found

@@ -13,8 +13,10 @@ from typing import Final
 
 import numpy as np
 
+from solver import tolerances
 from solver.kernels import kernel
 from solver.types import Corners, FloatArray, IntArray
+from solver.visibility.bvh import walk_hierarchy
 
 MAX_PLANES: Final = 20
 """Two polygon planes, and at most one supporting plane on either side of each of eight edges."""
@@ -23,6 +25,10 @@ FULL: Final = 0
 PARTIAL: Final = 1
 NONE: Final = 2
 """Visibility classes of a link."""
+
+
+_IN_LINE: Final = 1e-7
+"""An edge and a vertex span a plane if the sine of the angle at which they are seen is more than this."""
 
 
 @kernel
@@ -45,9 +51,7 @@ def shaft_planes(
         normal = normal1 if which == 0 else normal2
         for axis in range(3):
             planes[count, axis] = normal[axis]
-        planes[count, 3] = (
-            normal[0] * polygon[0, 0] + normal[1] * polygon[0, 1] + normal[2] * polygon[0, 2]
-        )
+        planes[count, 3] = normal[0] * polygon[0, 0] + normal[1] * polygon[0, 1] + normal[2] * polygon[0, 2]
         count += 1
     for which in range(2):
         a = first if which == 0 else second
@@ -69,13 +73,13 @@ def shaft_planes(
                 pz = ex * ry - ey * rx
                 length = np.sqrt(px * px + py * py + pz * pz)
                 reach = np.sqrt(rx * rx + ry * ry + rz * rz)
-                if length <= 1e-7 * edge * reach:
+                if length <= _IN_LINE * edge * reach:
                     continue
                 px /= length
                 py /= length
                 pz /= length
                 d = px * a[k, 0] + py * a[k, 1] + pz * a[k, 2]
-                slack = 1e-9 * (edge + reach)
+                slack = tolerances.SIDE * (edge + reach)
                 low = 0.0
                 high = 0.0
                 for j in range(na):
@@ -188,44 +192,6 @@ def covers(
 
 
 @kernel
-def walk_hierarchy(
-    low: FloatArray,
-    high: FloatArray,
-    skip: IntArray,
-    leaf_first: IntArray,
-    leaf_count: IntArray,
-    order: IntArray,
-    planes: FloatArray,
-    plane_count: int,
-    tolerance: float,
-    out: IntArray,
-) -> int:
-    """Polygons in leaves whose box reaches into the shaft, into `out`; returns their number."""
-    found = 0
-    node = 0
-    while node < len(skip):
-        missed = False
-        for p in range(plane_count):
-            # The box corner furthest along the plane's normal decides.
-            reach = 0.0
-            for axis in range(3):
-                c = planes[p, axis]
-                reach += c * (high[node, axis] if c > 0.0 else low[node, axis])
-            if reach - planes[p, 3] <= tolerance:
-                missed = True
-                break
-        if missed:
-            node = skip[node]
-            continue
-        if leaf_first[node] >= 0:
-            for k in range(leaf_first[node], leaf_first[node] + leaf_count[node]):
-                out[found] = order[k]
-                found += 1
-        node += 1
-    return found
-
-
-@kernel
 def first_blockers(
     pair_p: IntArray,
     pair_q: IntArray,
@@ -268,20 +234,12 @@ def first_blockers(
         hidden = False
         for k in range(found):
             b = candidates[k]
-            if b == p or b == q:
+            if b in (p, q):
                 continue
             if not can_block(
-                corners[b],
-                counts[b],
-                normals[b],
-                corners[p],
-                counts[p],
-                corners[q],
-                counts[q],
-                planes,
-                plane_count,
-                tolerance,
-            ):
+                corners[b], counts[b], normals[b], corners[p], counts[p], corners[q], counts[q],
+                planes, plane_count, tolerance,
+            ):  # fmt: skip
                 continue
             pool[used + kept] = b
             kept += 1

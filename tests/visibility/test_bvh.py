@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.types import Corners, IntArray
-from solver.visibility.bvh import LEAF_SIZE, Hierarchy, build_hierarchy
-from solver.visibility.shafts import walk_hierarchy
+from solver.visibility.bvh import LEAF_SIZE, Hierarchy, build_hierarchy, walk_hierarchy
 
 
 def corners_of(n: int, seed: int) -> Corners:
