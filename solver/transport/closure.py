@@ -27,8 +27,8 @@ _STEPS: Final = 2
 _MOST_REFLECTED: Final = 0.995
 """In an open scene no leaf reflects more than this share of a uniform field, whatever its links say."""
 
-_LIMIT: Final = 0.25
-"""A row sum further from 1 than this is not a rounding matter and is left alone."""
+_LEAST_SUM: Final = 0.25
+"""A row sum below this is no matter of scale."""
 
 
 def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
@@ -84,7 +84,7 @@ def balance(state: TransportState, closed: bool) -> Iterator[None]:
         row_sum = state.gather(unit)[:, 0, 0]
         yield
         if closed:
-            target = np.where(leaf & (np.abs(row_sum - 1.0) < _LIMIT), 1.0, row_sum)
+            target = np.where(leaf & (row_sum > _LEAST_SUM), 1.0, row_sum)
         else:
             target = np.where(leaf, np.minimum(row_sum, limit), row_sum)
         off = target != row_sum
@@ -93,7 +93,6 @@ def balance(state: TransportState, closed: bool) -> Iterator[None]:
         state.closure[off] *= np.sqrt(target[off] / row_sum[off])
     if closed:
         rows = state.gather(unit)[:, :, 0]
-        trusted = leaf & (np.abs(rows[:, 0] - 1.0) < _LIMIT)
-        state.remainder[trusted] = -rows[trusted]
-        state.remainder[trusted, 0] += 1.0
+        state.remainder[leaf] = -rows[leaf]
+        state.remainder[leaf, 0] += 1.0
         yield

@@ -27,6 +27,10 @@ LEAF: Final = 0.1
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
 
 
+SAFETY: Final = 1.15
+"""Factor on the estimate: errors that it does not know, such as of visibility that all rays agree on."""
+
+
 @dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """Where the error is."""
@@ -45,7 +49,7 @@ class ErrorEstimate:
         """Relative error of the reflected radiosity, 0 to 1."""
         if self.norm <= 0.0:
             return 0.0
-        return min(1.0, float(np.sqrt(self.links.sum() / self.norm)))
+        return min(1.0, SAFETY * float(np.sqrt(self.links.sum() / self.norm)))
 
 
 def estimate_error(state: TransportState) -> ErrorEstimate:

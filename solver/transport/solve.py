@@ -20,6 +20,7 @@ from solver.geometry.surfaces import Surfaces
 from solver.transport.closure import balance, is_closed
 from solver.transport.estimate import estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
+from solver.transport.gather import irradiance_at
 from solver.transport.linking import Light, Linker
 from solver.transport.links import LinkBatch
 from solver.transport.pushpull import means
@@ -27,9 +28,14 @@ from solver.transport.refine import PAIRS_AT_ONCE, choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
-from solver.types import Spectra
+from solver.types import FloatArray, Points, Spectra
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import FULL, NONE, PARTIAL
+
+_PROBE_RAYS: Final = 1 << 20
+_LEAST_RAYS: Final = 128
+_MOST_RAYS: Final = 8192
+"""Rays of one call of `irradiance_at`, and their bounds per point."""
 
 _REFINE_SHARE: Final = 0.75
 """A round of refinement resolves at most this share of the squared error."""
@@ -147,6 +153,18 @@ class RadiositySolver:
             irradiance=self._to_rgb(received),
         )
 
+    def irradiance_at(self, positions: Points, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The gather at points (n, 3) with unit normals (n, 3) from the solution as it stands.
+
+        Returns irradiance (n, 3) in W/m2, and the estimated relative error of its luminance (n,): that of
+        the solution and that of the gather's own rays.
+        """
+        per_point = max(_LEAST_RAYS, min(_MOST_RAYS, _PROBE_RAYS // max(len(positions), 1)))
+        irradiance, noise = irradiance_at(self._state, self._rays, positions, normals, per_point)
+        bright = irradiance @ self._state.weights
+        relative = np.where(bright > 0.0, noise / np.where(bright > 0.0, bright, 1.0), 0.0)
+        return self._to_rgb(irradiance), np.minimum(1.0, np.hypot(relative, self.error_estimate))
+
     def _to_rgb(self, spectra: Spectra) -> Spectra:
         return np.repeat(spectra, 3, axis=1) if self._state.channels == 1 else spectra.copy()
 
@@ -185,7 +203,7 @@ class RadiositySolver:
             if self.error_estimate <= tolerance:
                 return
             total = float(estimate.links.sum())
-            excess = (total - (0.95 * tolerance) ** 2 * estimate.norm) / 0.7
+            excess = total * (1.0 - (0.95 * tolerance / self.error_estimate) ** 2) / 0.7
             choice = choose(state, estimate, self.settings, min(excess, _REFINE_SHARE * total))
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
