@@ -17,7 +17,8 @@ from solver.types import FloatArray
 
 
 @kernel
-def hash_index(x: int) -> int:
+def hash_index(x: np.int64) -> np.int64:
+    """63 bits that look random, from a number of a pair of elements."""
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x7F4A7C15)
     h ^= h >> np.uint64(32)
     h *= np.uint64(0xD6E8FEB86659FD93)
@@ -57,9 +58,7 @@ def sample_element(
         out[axis] = (
             wa * corners[0, axis] + wb * corners[1, axis] + wc * corners[2, axis] + wd * corners[3, axis]
         )
-    return (
-        (sy * tz - sz * ty) * normal[0] + (sz * tx - sx * tz) * normal[1] + (sx * ty - sy * tx) * normal[2]
-    )
+    return (sy * tz - sz * ty) * normal[0] + (sz * tx - sx * tz) * normal[1] + (sx * ty - sy * tx) * normal[2]
 
 
 @kernel
@@ -79,7 +78,7 @@ def _solid_angle(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
 @kernel
 def _towards(a: FloatArray, b: FloatArray, out: FloatArray) -> float:
     """The unit vector orthogonal to unit a in the half plane of b, into out; returns a . b."""
-    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    dot: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     square = 0.0
     for axis in range(3):
         out[axis] = b[axis] - dot * a[axis]
@@ -92,7 +91,14 @@ def _towards(a: FloatArray, b: FloatArray, out: FloatArray) -> float:
 
 @kernel
 def _direction_in(
-    a: FloatArray, b: FloatArray, c: FloatArray, area: float, u: float, v: float, work: FloatArray, out: FloatArray
+    a: FloatArray,
+    b: FloatArray,
+    c: FloatArray,
+    area: float,
+    u: float,
+    v: float,
+    work: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Direction at (u, v) of the unit square in a spherical triangle, uniform by solid angle; work (3, 3)."""
     to_b = work[0]

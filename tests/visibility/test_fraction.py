@@ -17,7 +17,8 @@ from solver.pathtracing import PathTracer
 from solver.transport.elements import ElementTree
 from solver.types import Points
 from solver.visibility.brute_force import visible_fraction
-from solver.visibility.fraction import BATCH, STRATA, VisibleFractions, visible_fractions
+from solver.visibility.fraction import BATCH, VisibleFractions, visible_fractions
+from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
 
 SQUARE = np.array([[-0.5, -0.5, 0.0], [0.5, -0.5, 0.0], [0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]])
