@@ -142,8 +142,7 @@ def _edit(drawing: Drawing) -> None:
         ]
     )
     _run(engine)
-    if hasattr(RadiositySolver, "irradiance_at"):
-        engine.probe(np.array([[0.5, 0.3, 0.0], [0.0, 0.5, 0.5]]), np.array([[0, 0, 1.0], [1.0, 0, 0]]))
+    engine.probe(np.array([[0.5, 0.3, 0.0], [0.0, 0.5, 0.5]]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
     engine.status()
 
 

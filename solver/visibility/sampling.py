@@ -58,7 +58,9 @@ def sample_element(
         out[axis] = (
             wa * corners[0, axis] + wb * corners[1, axis] + wc * corners[2, axis] + wd * corners[3, axis]
         )
-    return (sy * tz - sz * ty) * normal[0] + (sz * tx - sx * tz) * normal[1] + (sx * ty - sy * tx) * normal[2]
+    nx, ny, nz = sy * tz - sz * ty, sz * tx - sx * tz, sx * ty - sy * tx
+    jacobian: float = nx * normal[0] + ny * normal[1] + nz * normal[2]
+    return jacobian
 
 
 @kernel
