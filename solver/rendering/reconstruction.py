@@ -65,7 +65,17 @@ def vertex_irradiance(field: RadiosityField, surfaces: Surfaces, topology: Topol
 
     def evaluate(start: int, stop: int) -> None:
         _evaluate(
-            start, stop, t.leaf_start, t.leaf_edge, t.hanging_on, flat, centroid, means, gradient, spread, values
+            start,
+            stop,
+            t.leaf_start,
+            t.leaf_edge,
+            t.hanging_on,
+            flat,
+            centroid,
+            means,
+            gradient,
+            spread,
+            values,
         )
 
     for work, count in ((flatten, n), (fit, n), (evaluate, v)):
@@ -116,9 +126,9 @@ def _flatten(
         for k in range(1, count[leaf] - 1):
             b = vertex[leaf, k]
             c = vertex[leaf, k + 1]
-            doubled = (flat[b, 0] - flat[a, 0]) * (flat[c, 1] - flat[a, 1]) - (
-                flat[b, 1] - flat[a, 1]
-            ) * (flat[c, 0] - flat[a, 0])
+            doubled = (flat[b, 0] - flat[a, 0]) * (flat[c, 1] - flat[a, 1]) - (flat[b, 1] - flat[a, 1]) * (
+                flat[c, 0] - flat[a, 0]
+            )
             total += doubled
             for axis in range(2):
                 centroid[leaf, axis] += doubled * (flat[a, axis] + flat[b, axis] + flat[c, axis]) / 3.0

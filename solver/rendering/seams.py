@@ -75,8 +75,8 @@ def find_lines(surfaces: Surfaces) -> SeamLines:
     # The point of the line that is nearest to the scene's centre.
     offset = (start - surfaces.center) / surfaces.size
     offset = offset - np.einsum("ij,ij->i", offset, direction)[:, None] * direction
-    group = _group(np.concatenate([direction, offset], axis=1))
-    first, group, size = np.unique(group, return_index=True, return_inverse=True, return_counts=True)[1:]
+    label = _group(np.concatenate([direction, offset], axis=1))
+    first, group, size = np.unique(label, return_index=True, return_inverse=True, return_counts=True)[1:]
     line[patch, slot] = np.where(size[group] > 1, group, -1)
     return SeamLines(line, direction[first])
 

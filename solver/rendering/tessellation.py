@@ -165,7 +165,12 @@ def _all_values(field: RadiosityField, outlines: _Outlines, values: FloatArray) 
 
 @kernel
 def _fill_middles(
-    corners: Corners, count: IntArray, vertex: IntArray, mean: FloatArray, values: FloatArray, middle: FloatArray
+    corners: Corners,
+    count: IntArray,
+    vertex: IntArray,
+    mean: FloatArray,
+    values: FloatArray,
+    middle: FloatArray,
 ) -> None:
     """Values in the middles of m leaves: what a quadratic with these corners and this mean has there.
 
@@ -182,9 +187,7 @@ def _fill_middles(
             for k in range(4):
                 spanned[k] = _spanned_area(corners, i, k)
             for k in range(4):
-                weight[k] = (
-                    4.0 * spanned[k] + 2.0 * (spanned[k - 1] + spanned[k - 3]) + spanned[k - 2]
-                )
+                weight[k] = 4.0 * spanned[k] + 2.0 * (spanned[k - 1] + spanned[k - 3]) + spanned[k - 2]
         else:
             weight[:] = 1.0
         total = 0.0
@@ -278,7 +281,9 @@ def _fill_triangles(
             while inside_start[4 * leaf + k + 1] == inside_start[4 * leaf]:
                 k += 1
             for i in range(1, corners):
-                _put(triangles, at, apex, vertex[leaf, (k + i) % corners], vertex[leaf, (k + i + 1) % corners])
+                _put(
+                    triangles, at, apex, vertex[leaf, (k + i) % corners], vertex[leaf, (k + i + 1) % corners]
+                )
                 at += 1
         else:
             # A fan from the middle to all pieces of all edges.

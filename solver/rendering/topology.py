@@ -71,9 +71,7 @@ def connect(field: RadiosityField) -> Topology:
     inside_start = np.zeros(4 * n + 1, dtype=np.int32)
     inside = np.empty(opened, dtype=np.int32)
     hanging_on = np.full(v, -1, dtype=np.int32)
-    total = _walk(
-        vertex, end, position, leaf_start, leaf_edge, is_open, inside_start, inside, hanging_on
-    )
+    total = _walk(vertex, end, position, leaf_start, leaf_edge, is_open, inside_start, inside, hanging_on)
     return Topology(
         vertex=vertex,
         position=position,

@@ -47,9 +47,7 @@ def split_leaf(corners: FloatArray) -> list[FloatArray]:
         tips = [np.array([corners[k], middle[k], middle[k - 1]]) for k in range(3)]
         return [*tips, middle]
     center = 0.5 * (middle[0] + middle[2])
-    return [
-        np.roll(np.array([corners[k], middle[k], center, middle[k - 1]]), k, axis=0) for k in range(4)
-    ]
+    return [np.roll(np.array([corners[k], middle[k], center, middle[k - 1]]), k, axis=0) for k in range(4)]
 
 
 def constant(value: float = 1.0) -> Function:

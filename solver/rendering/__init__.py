@@ -1,0 +1,1 @@
+"""Frames from radiosity fields: meshes without cracks, OpenGL passes, tone mapping, image formats."""
