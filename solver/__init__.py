@@ -1,0 +1,1 @@
+"""Global illumination of edited scenes: geometry, visibility, light transport, frames."""

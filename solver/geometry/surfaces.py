@@ -61,7 +61,8 @@ class Surfaces:
     def is_grey(self) -> bool:
         """Whether one channel tells all: reflectance and emission are equal over R, G and B."""
         return bool(
-            np.all(self.reflectance == self.reflectance[:, :1]) and np.all(self.emission == self.emission[:, :1])
+            np.all(self.reflectance == self.reflectance[:, :1])
+            and np.all(self.emission == self.emission[:, :1])
         )
 
 
@@ -99,7 +100,9 @@ def flatten(scene: Scene) -> Surfaces:
 
 
 def _bounds(objects: Sequence[SceneObject]) -> tuple[Vector, float]:
-    used = [o.world_vertices[sorted({i for face in o.mesh.faces for i in face})] for o in objects if o.mesh.faces]
+    used = [
+        o.world_vertices[sorted({i for face in o.mesh.faces for i in face})] for o in objects if o.mesh.faces
+    ]
     if not used:
         return np.zeros(3), 1.0
     low = np.min([v.min(axis=0) for v in used], axis=0)
@@ -178,7 +181,9 @@ def _opaque_triangles(corners: Corners, count: IntArray) -> tuple[FloatArray, In
 def _warnings(object_id: ObjectId, dropped: Sequence[int], unfaithful: Sequence[int]) -> tuple[str, ...]:
     told = []
     if dropped:
-        told.append(f"object {object_id!r}: {_count(len(dropped))} of zero area dropped (first: {dropped[0]})")
+        told.append(
+            f"object {object_id!r}: {_count(len(dropped))} of zero area dropped (first: {dropped[0]})"
+        )
     if unfaithful:
         told.append(
             f"object {object_id!r}: {_count(len(unfaithful))} crossing itself, triangulated approximately "

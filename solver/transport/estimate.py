@@ -67,7 +67,7 @@ def estimate_error(state: TransportState) -> ErrorEstimate:
     arriving_amplitudes(links.p, links.q, links.residual_p, links.residual_q, reflectance, mean, amplitude)
     leaf_residuals(tree.parent, tree.area, amplitude, variance)
     element_residuals(
-        tree.child, tree.child_count, tree.area, tree.moment, tree.offset, moments[:, :, 0], variance, spread
+        tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
     )
     leaving_bias(
         links.p, links.q, links.residual_p, links.residual_q, tree.parent, tree.child, tree.child_count,

@@ -34,7 +34,9 @@ _RULES = [np.polynomial.legendre.leggauss(n) for n in range(1, MAX_POINTS + 2)]
 GAUSS_NODES: Final[FloatArray] = np.array(
     [np.pad(0.5 * (x + 1.0), (0, MAX_POINTS + 1 - len(x))) for x, _ in _RULES]
 )
-GAUSS_WEIGHTS: Final[FloatArray] = np.array([np.pad(0.5 * w, (0, MAX_POINTS + 1 - len(w))) for _, w in _RULES])
+GAUSS_WEIGHTS: Final[FloatArray] = np.array(
+    [np.pad(0.5 * w, (0, MAX_POINTS + 1 - len(w))) for _, w in _RULES]
+)
 
 
 @kernel
@@ -53,7 +55,9 @@ def distance_to_polygon(
         ry = py - polygon[k, 1]
         rz = pz - polygon[k, 2]
         side = (
-            (ey * rz - ez * ry) * normal[0] + (ez * rx - ex * rz) * normal[1] + (ex * ry - ey * rx) * normal[2]
+            (ey * rz - ez * ry) * normal[0]
+            + (ez * rx - ex * rz) * normal[1]
+            + (ex * ry - ey * rx) * normal[2]
         )
         if side < 0.0:
             inside = False
@@ -67,9 +71,11 @@ def distance_to_polygon(
         nearest = min(nearest, dx * dx + dy * dy + dz * dz)
     if inside:
         height = (
-            (px - polygon[0, 0]) * normal[0] + (py - polygon[0, 1]) * normal[1] + (pz - polygon[0, 2]) * normal[2]
+            (px - polygon[0, 0]) * normal[0]
+            + (py - polygon[0, 1]) * normal[1]
+            + (pz - polygon[0, 2]) * normal[2]
         )
-        return abs(height)
+        return float(abs(height))
     return math.sqrt(nearest)
 
 
@@ -184,7 +190,7 @@ def exchange_area(
 @kernel
 def dot3(a: FloatArray, b: FloatArray) -> float:
     """Inner product of two (3,) arrays."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @kernel
@@ -242,7 +248,10 @@ def form_factor(receiver: Points, source: Points, tolerance: float = 1e-4) -> fl
     if len(receiver) > 4:
         pieces = _fan(receiver)
         areas = np.array([_prepared(piece)[3] for piece in pieces])
-        return float(sum(form_factor(p, source, tolerance) * a for p, a in zip(pieces, areas, strict=True)) / areas.sum())
+        return float(
+            sum(form_factor(p, source, tolerance) * a for p, a in zip(pieces, areas, strict=True))
+            / areas.sum()
+        )
     if len(source) > 4:
         return sum(form_factor(receiver, piece, tolerance) for piece in _fan(source))
     p, n1, normal1, area1 = _prepared(receiver)

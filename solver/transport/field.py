@@ -13,7 +13,9 @@ class SolveOutcome(Enum):
 
     RUNNING = "The solution is being refined."
     CONVERGED = "The estimated error is within the tolerance."
-    ELEMENT_LIMIT = "The element limit was reached before the tolerance: raise max_elements or error_tolerance."
+    ELEMENT_LIMIT = (
+        "The element limit was reached before the tolerance: raise max_elements or error_tolerance."
+    )
     LINK_LIMIT = "The link limit was reached before the tolerance: raise max_links or error_tolerance."
     TRANSPORT_ERROR = (
         "No link errs by more than transport_error, but the field does by more than error_tolerance: "

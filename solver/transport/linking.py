@@ -13,18 +13,16 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
-from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
-from solver.transport.exchange import exchange_area, heights
 from solver.transport.links import LinkBatch, ragged_indices
 from solver.transport.oracle import samples_needed
-from solver.transport.variation import form_factor_variation, solve_moment
-from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
+from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
+from solver.types import FloatArray, Int64Array, IntArray
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
-from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, first_blockers, inherited_blockers
+from solver.visibility.shafts import NONE, PARTIAL, first_blockers
 
 _CHUNK: Final = 256
 
@@ -72,7 +70,7 @@ class Linker:
         empty = np.empty(0, dtype=np.int32)
 
         def count(a: int, b: int) -> None:
-            _facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
+            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
                     counts, False, empty, empty)  # fmt: skip
 
         run_chunks(count, stop - start, 64)
@@ -81,7 +79,7 @@ class Linker:
         first = np.cumsum(counts) - counts
 
         def fill(a: int, b: int) -> None:
-            _facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
+            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
                     first, True, p, q)  # fmt: skip
 
         run_chunks(fill, stop - start, 64)
@@ -132,7 +130,7 @@ class Linker:
         s = self.surfaces
 
         def work(start: int, stop: int) -> None:
-            _inherit(
+            inherit_blockers(
                 p, q, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count, s.normal,
                 parent_start, parent_count, parent_pool, self.side_tolerance, start, stop, room, loose, kind,
                 kept,
@@ -157,10 +155,10 @@ class Linker:
         position, residual = np.zeros((2, n, 2)), np.zeros((2, n))
 
         def work(start: int, stop: int) -> None:
-            _exchange(
-                p, q, kind, tree.corners, tree.corner_count, tree.area, tree.patch, tree.centroid, tree.moment,
-                self.surfaces.normal, tree.axes, self.side_tolerance, self.exchange_tolerance, start, stop,
-                open_exchange, position[0], position[1], residual[0], residual[1],
+            find_exchange(
+                p, q, kind, tree.corners, tree.corner_count, tree.area, tree.patch, tree.centroid,
+                tree.moment, self.surfaces.normal, tree.axes, self.side_tolerance, self.exchange_tolerance,
+                start, stop, open_exchange, position[0], position[1], residual[0], residual[1],
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK)
@@ -192,7 +190,7 @@ class Linker:
                 residual[end, part] = np.sqrt(seen**2 * varied + (mean**2 + varied) * spread)
         slope = np.empty((2, n, 2))
         for end, element in enumerate((p, q)):
-            _slopes(tree.moment, element, open_exchange, position[end], slope[end])
+            find_slopes(tree.moment, element, open_exchange, position[end], slope[end])
         alive = (open_exchange > 0.0) | (kind == NONE)
         ends = np.cumsum(kept, dtype=np.int64)
         return LinkBatch(
@@ -210,129 +208,3 @@ class Linker:
             blocker_count=kept[alive],
             blockers=pool[ragged_indices((ends - kept)[alive], kept[alive])],
         )
-
-
-@kernel
-def _facing(
-    corners: Corners,
-    counts: IntArray,
-    normals: FloatArray,
-    tolerance: float,
-    base: int,
-    start: int,
-    stop: int,
-    slot: Int64Array,
-    write: bool,
-    out_p: IntArray,
-    out_q: IntArray,
-) -> None:
-    """Count, or write from slot[p - base], the patches q > p that p in [start, stop) faces."""
-    for p in range(start, stop):
-        found = 0
-        for q in range(p + 1, len(corners)):
-            _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
-            if high <= tolerance:
-                continue
-            _, high = heights(corners[p], counts[p], corners[q, 0], normals[q])
-            if high <= tolerance:
-                continue
-            if write:
-                out_p[slot[p - base] + found] = p
-                out_q[slot[p - base] + found] = q
-            found += 1
-        if not write:
-            slot[p - base] = found
-
-
-@kernel
-def _inherit(
-    p: IntArray,
-    q: IntArray,
-    corners: Corners,
-    counts: IntArray,
-    patch: IntArray,
-    patch_corners: Corners,
-    patch_counts: IntArray,
-    normals: FloatArray,
-    parent_start: Int64Array,
-    parent_count: IntArray,
-    parent_pool: IntArray,
-    tolerance: float,
-    start: int,
-    stop: int,
-    room: Int64Array,
-    out: IntArray,
-    kind: IntArray,
-    kept: IntArray,
-) -> None:
-    planes = np.empty((MAX_PLANES, 4))
-    for pair in range(start, stop):
-        if parent_count[pair] == 0:
-            kind[pair] = FULL
-            kept[pair] = 0
-            continue
-        i = p[pair]
-        j = q[pair]
-        kind[pair], kept[pair] = inherited_blockers(
-            corners[i], counts[i], normals[patch[i]], corners[j], counts[j], normals[patch[j]],
-            patch_corners, patch_counts, normals, parent_pool, parent_start[pair], parent_count[pair],
-            tolerance, planes, out, room[pair],
-        )  # fmt: skip
-
-
-@kernel
-def _slopes(
-    moment: FloatArray, element: IntArray, exchange: FloatArray, position: FloatArray, slope: FloatArray
-) -> None:
-    """Exchange (n,) per metre (n, 2) from the mean position (n, 2) of the light on the elements (n,)."""
-    for link in range(len(element)):
-        a, b = solve_moment(moment[element[link]], position[link, 0], position[link, 1])
-        slope[link, 0] = exchange[link] * a
-        slope[link, 1] = exchange[link] * b
-
-
-@kernel
-def _exchange(
-    p: IntArray,
-    q: IntArray,
-    kind: IntArray,
-    corners: Corners,
-    counts: IntArray,
-    area: FloatArray,
-    patch: IntArray,
-    centroid: Points,
-    moment: FloatArray,
-    normals: FloatArray,
-    axes: FloatArray,
-    side_tolerance: float,
-    tolerance: float,
-    start: int,
-    stop: int,
-    exchange: FloatArray,
-    position_p: FloatArray,
-    position_q: FloatArray,
-    residual_p: FloatArray,
-    residual_q: FloatArray,
-) -> None:
-    scratch = np.empty((2, 8, 3))
-    for pair in range(start, stop):
-        if kind[pair] == NONE:
-            continue
-        i = p[pair]
-        j = q[pair]
-        n1 = normals[patch[i]]
-        n2 = normals[patch[j]]
-        exchange[pair] = exchange_area(
-            corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], side_tolerance,
-            tolerance, scratch,
-        )  # fmt: skip
-        if exchange[pair] <= 0.0:
-            continue
-        residual_p[pair] = form_factor_variation(
-            corners[i], counts[i], n1, axes[patch[i]], centroid[i], moment[i], area[i], corners[j], counts[j],
-            n2, area[j], centroid[j], exchange[pair], scratch[0], position_p[pair],
-        )  # fmt: skip
-        residual_q[pair] = form_factor_variation(
-            corners[j], counts[j], n2, axes[patch[j]], centroid[j], moment[j], area[j], corners[i], counts[i],
-            n1, area[i], centroid[i], exchange[pair], scratch[0], position_q[pair],
-        )  # fmt: skip

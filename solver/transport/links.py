@@ -146,7 +146,7 @@ class LinkTable:
     @property
     def nbytes(self) -> int:
         """Bytes held."""
-        return sum(column.nbytes for column in (*self._columns(), self._pool))
+        return self._pool.nbytes + sum(column.nbytes for column in self._columns())
 
     def append(self, batch: LinkBatch) -> None:
         """Take evaluated links in."""
@@ -201,4 +201,4 @@ def ragged_indices(start: Int64Array, count: IntArray) -> Int64Array:
     """Concatenation of the ranges [start, start + count), (sum(count),)."""
     total = int(count.sum())
     ends = np.cumsum(count, dtype=np.int64)
-    return np.arange(total, dtype=np.int64) + np.repeat(start - (ends - count), count)
+    return np.asarray(np.arange(total, dtype=np.int64) + np.repeat(start - (ends - count), count))

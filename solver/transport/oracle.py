@@ -63,9 +63,7 @@ def arriving_amplitudes(
 
 
 @kernel
-def leaf_residuals(
-    parent: IntArray, area: FloatArray, amplitude: FloatArray, variance: FloatArray
-) -> None:
+def leaf_residuals(parent: IntArray, area: FloatArray, amplitude: FloatArray, variance: FloatArray) -> None:
     """Variance of the radiosity within each element (n,) that no linear function shows, (W/m2)^2.
 
     What a link brings to an ancestor varies over a descendant in proportion to its length at most.
@@ -82,7 +80,6 @@ def element_residuals(
     child_count: IntArray,
     area: FloatArray,
     moment: FloatArray,
-    offset: FloatArray,
     moments: FloatArray,
     variance: FloatArray,
     spread: FloatArray,
@@ -174,7 +171,13 @@ def link_errors(
         error_v[link] = 0.0
         if noise[link] > 0.0:
             error_v[link] = noise[link] * link_weight(
-                open_exchange[link], area[i], area[j], reflectance[i], reflectance[j], radiosity[i], radiosity[j]
+                open_exchange[link],
+                area[i],
+                area[j],
+                reflectance[i],
+                reflectance[j],
+                radiosity[i],
+                radiosity[j],
             )
         arriving = reflectance[i] * radiosity[j] * residual_p[link] * amplitude[i]
         leaving = CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j]) * bias[j]

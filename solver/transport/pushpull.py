@@ -105,7 +105,9 @@ def gather(
             received[j, 2, c] += to_j * bv * mi
 
 
-def irradiance(tree: ElementTree, links: LinkTable, closure: FloatArray, remainder: FloatArray, radiosity: FloatArray) -> FloatArray:
+def irradiance(
+    tree: ElementTree, links: LinkTable, closure: FloatArray, remainder: FloatArray, radiosity: FloatArray
+) -> FloatArray:
     """Irradiance functions (n, 3, channels) on every element from the leaf radiosities (n, 3, channels).
 
     Inner rows of `radiosity` are ignored; inner rows of the result hold what the leaves below share
@@ -116,9 +118,7 @@ def irradiance(tree: ElementTree, links: LinkTable, closure: FloatArray, remaind
     moments = np.empty_like(sent)
     pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, sent, moments)
     received = np.zeros_like(sent)
-    gather(
-        links.p, links.q, links.exchange, links.slope_p, links.slope_q, tree.area, moments, received
-    )
+    gather(links.p, links.q, links.exchange, links.slope_p, links.slope_q, tree.area, moments, received)
     push(tree.parent, tree.offset, received)
     received *= closure[:, None, None]
     if remainder.any():

@@ -30,7 +30,9 @@ def settle(state: TransportState, target: float) -> Iterator[float]:
     emission[:, 0] = state.emission[tree.patch]
     area = np.where(leaf, tree.area, 0.0)
     active = np.broadcast_to(reflectance > 0.0, emission.shape)
-    weight = np.where(reflectance > 0.0, area[:, None, None] / np.where(reflectance > 0.0, reflectance, 1.0), 0.0)
+    weight = np.where(
+        reflectance > 0.0, area[:, None, None] / np.where(reflectance > 0.0, reflectance, 1.0), 0.0
+    )
     state.radiosity[~active] = emission[~active]
     state.received = state.gather(state.radiosity)
     unshot = np.where(active, emission + reflectance * state.received - state.radiosity, 0.0)

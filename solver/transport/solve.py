@@ -190,9 +190,9 @@ class RadiositySolver:
             for _ in balance(state, self._closed):
                 yield True
             cutoff = self.settings.relative_cutoff
-            for self.unshot_fraction in settle(
-                state, 0.05 * min(tolerance, self.error_estimate) if cutoff is None else cutoff
-            ):
+            target = 0.05 * min(tolerance, self.error_estimate) if cutoff is None else cutoff
+            for unshot in settle(state, target):
+                self.unshot_fraction = unshot
                 yield True
             estimate = estimate_error(state)
             self.error_estimate = estimate.relative

@@ -65,7 +65,7 @@ class TransportState:
     @property
     def channels(self) -> int:
         """1 in a grey scene, 3 otherwise."""
-        return self.emission.shape[1]
+        return int(self.emission.shape[1])
 
     @property
     def nbytes(self) -> int:

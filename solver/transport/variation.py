@@ -104,9 +104,7 @@ def form_factor_variation(
             if cosine1 > 0.0 and cosine2 > 0.0:
                 value = cosine1 * cosine2 * source_area / (math.pi * square * square)
         else:
-            value = point_form_factor(
-                x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch
-            )
+            value = point_form_factor(x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch)
         if k == count:
             middle = value
             continue
@@ -167,9 +165,15 @@ def form_factor_variation(
 
 @kernel
 def _square_distance(
-    x: float, y: float, z: float, polygon: FloatArray, count: int, normal: FloatArray, nearest: FloatArray
+    x: float,
+    y: float,
+    z: float,
+    polygon: FloatArray,
+    count: int,
+    normal: FloatArray,
+    nearest: FloatArray,
 ) -> float:
-    """Squared distance (m2) of a point from a convex polygon (4, 3), whose nearest point goes to nearest (3,)."""
+    """Squared distance (m2) of a point from a convex polygon (4, 3), and its nearest point (3,)."""
     least = math.inf
     inside = True
     for k in range(count):
@@ -181,7 +185,9 @@ def _square_distance(
         py = y - polygon[k, 1]
         pz = z - polygon[k, 2]
         left = (
-            normal[0] * (ey * pz - ez * py) + normal[1] * (ez * px - ex * pz) + normal[2] * (ex * py - ey * px)
+            normal[0] * (ey * pz - ez * py)
+            + normal[1] * (ez * px - ex * pz)
+            + normal[2] * (ex * py - ey * px)
         )
         if left >= 0.0:
             continue
@@ -199,10 +205,12 @@ def _square_distance(
             nearest[2] = z - dz
     if inside:
         height = (
-            (x - polygon[0, 0]) * normal[0] + (y - polygon[0, 1]) * normal[1] + (z - polygon[0, 2]) * normal[2]
+            (x - polygon[0, 0]) * normal[0]
+            + (y - polygon[0, 1]) * normal[1]
+            + (z - polygon[0, 2]) * normal[2]
         )
         nearest[0] = x - height * normal[0]
         nearest[1] = y - height * normal[1]
         nearest[2] = z - height * normal[2]
-        return height * height
+        return float(height * height)
     return least

@@ -88,7 +88,7 @@ def _towards(a: FloatArray, b: FloatArray, out: FloatArray) -> float:
     scale = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
     for axis in range(3):
         out[axis] *= scale
-    return dot
+    return float(dot)
 
 
 @kernel

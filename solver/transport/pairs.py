@@ -1,0 +1,139 @@
+"""Kernels over pairs of elements: which face each other, what stands between, what they exchange."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.kernels import kernel
+from solver.transport.exchange import exchange_area, heights
+from solver.transport.variation import form_factor_variation, solve_moment
+from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
+from solver.visibility.shafts import FULL, MAX_PLANES, NONE, inherited_blockers
+
+
+@kernel
+def list_facing(
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    tolerance: float,
+    base: int,
+    start: int,
+    stop: int,
+    slot: Int64Array,
+    write: bool,
+    out_p: IntArray,
+    out_q: IntArray,
+) -> None:
+    """Count, or write from slot[p - base], the patches q > p that p in [start, stop) faces."""
+    for p in range(start, stop):
+        found = 0
+        for q in range(p + 1, len(corners)):
+            _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
+            if high <= tolerance:
+                continue
+            _, high = heights(corners[p], counts[p], corners[q, 0], normals[q])
+            if high <= tolerance:
+                continue
+            if write:
+                out_p[slot[p - base] + found] = p
+                out_q[slot[p - base] + found] = q
+            found += 1
+        if not write:
+            slot[p - base] = found
+
+
+@kernel
+def inherit_blockers(
+    p: IntArray,
+    q: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    patch: IntArray,
+    patch_corners: Corners,
+    patch_counts: IntArray,
+    normals: FloatArray,
+    parent_start: Int64Array,
+    parent_count: IntArray,
+    parent_pool: IntArray,
+    tolerance: float,
+    start: int,
+    stop: int,
+    room: Int64Array,
+    out: IntArray,
+    kind: IntArray,
+    kept: IntArray,
+) -> None:
+    """Visibility classes of pairs [start, stop), and which blockers of the parents' links are left."""
+    planes = np.empty((MAX_PLANES, 4))
+    for pair in range(start, stop):
+        if parent_count[pair] == 0:
+            kind[pair] = FULL
+            kept[pair] = 0
+            continue
+        i = p[pair]
+        j = q[pair]
+        kind[pair], kept[pair] = inherited_blockers(
+            corners[i], counts[i], normals[patch[i]], corners[j], counts[j], normals[patch[j]],
+            patch_corners, patch_counts, normals, parent_pool, parent_start[pair], parent_count[pair],
+            tolerance, planes, out, room[pair],
+        )  # fmt: skip
+
+
+@kernel
+def find_slopes(
+    moment: FloatArray, element: IntArray, exchange: FloatArray, position: FloatArray, slope: FloatArray
+) -> None:
+    """Exchange (n,) per metre (n, 2) from the mean position (n, 2) of the light on the elements (n,)."""
+    for link in range(len(element)):
+        a, b = solve_moment(moment[element[link]], position[link, 0], position[link, 1])
+        slope[link, 0] = exchange[link] * a
+        slope[link, 1] = exchange[link] * b
+
+
+@kernel
+def find_exchange(
+    p: IntArray,
+    q: IntArray,
+    kind: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    area: FloatArray,
+    patch: IntArray,
+    centroid: Points,
+    moment: FloatArray,
+    normals: FloatArray,
+    axes: FloatArray,
+    side_tolerance: float,
+    tolerance: float,
+    start: int,
+    stop: int,
+    exchange: FloatArray,
+    position_p: FloatArray,
+    position_q: FloatArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
+) -> None:
+    """Exchange areas of pairs [start, stop), and how they vary over either end."""
+    scratch = np.empty((2, 8, 3))
+    for pair in range(start, stop):
+        if kind[pair] == NONE:
+            continue
+        i = p[pair]
+        j = q[pair]
+        n1 = normals[patch[i]]
+        n2 = normals[patch[j]]
+        exchange[pair] = exchange_area(
+            corners[i], counts[i], n1, area[i], corners[j], counts[j], n2, area[j], side_tolerance,
+            tolerance, scratch,
+        )  # fmt: skip
+        if exchange[pair] <= 0.0:
+            continue
+        residual_p[pair] = form_factor_variation(
+            corners[i], counts[i], n1, axes[patch[i]], centroid[i], moment[i], area[i], corners[j], counts[j],
+            n2, area[j], centroid[j], exchange[pair], scratch[0], position_p[pair],
+        )  # fmt: skip
+        residual_q[pair] = form_factor_variation(
+            corners[j], counts[j], n2, axes[patch[j]], centroid[j], moment[j], area[j], corners[i], counts[i],
+            n1, area[i], centroid[i], exchange[pair], scratch[0], position_q[pair],
+        )  # fmt: skip
