@@ -12,6 +12,7 @@ from typing import Final
 from service.hosting.messages import Open
 from service.hosting.pool import WorkerPool
 from service.hosting.remote import RefusedError, RemoteWorker
+from solver.engine.status import EngineStatus
 
 _LONGEST_NAP: Final = 30.0
 """Seconds between two looks for idle sessions, at most."""
@@ -81,15 +82,18 @@ class Sessions:
             raise NoSuchSessionError(session_id)
         return found
 
-    async def open(self, request: Open) -> Session:
-        """A new session, solving. Raises TooManySessionsError, RefusedError, WorkerGoneError."""
+    async def open(self, request: Open) -> tuple[Session, EngineStatus]:
+        """A new session, solving, and how it stands.
+
+        Raises TooManySessionsError, RefusedError, WorkerGoneError.
+        """
         if len(self._by_id) + self._opening >= self._limit:
             raise TooManySessionsError(self._limit)
         self._opening += 1
         try:
             worker = await self._pool.take()
             try:
-                await worker.call(request)
+                status = await worker.call(request)
             except RefusedError:
                 self._pool.give_back(worker)
                 raise
@@ -100,7 +104,7 @@ class Sessions:
             self._opening -= 1
         session = Session(secrets.token_hex(8), worker)
         self._by_id[session.id] = session
-        return session
+        return session, status
 
     async def end(self, session_id: str) -> None:
         """End a session and free all that it holds. Raises NoSuchSessionError."""
@@ -113,7 +117,8 @@ class Sessions:
         while True:
             await asyncio.sleep(min(_LONGEST_NAP, 0.25 * self._idle_seconds))
             for session in self:
-                if session.idle_seconds > self._idle_seconds:
+                # While one was ended, a client may have ended the next.
+                if session.id in self._by_id and session.idle_seconds > self._idle_seconds:
                     await self.end(session.id)
 
     async def close(self) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Depends, WebSocket
+from typing import Annotated
 
-from service.context import session_of
-from service.problems import NOT_AVAILABLE, ProblemError, respond
+from fastapi import APIRouter, Depends, Path, WebSocket
+
+from service.context import Context, session_of
+from service.hosting.sessions import NoSuchSessionError
+from service.problems import NO_SUCH_SESSION, NOT_AVAILABLE, ProblemError, respond
 
 router = APIRouter(prefix="/v1", include_in_schema=False)
 sockets = APIRouter(prefix="/v1")
@@ -23,6 +26,12 @@ async def not_yet() -> None:
 
 
 @sockets.websocket("/sessions/{id}/stream")
-async def no_stream_yet(socket: WebSocket) -> None:
+async def no_stream_yet(socket: WebSocket, session_id: Annotated[str, Path(alias="id")]) -> None:
     """Say so to who wants a stream."""
-    await socket.send_denial_response(respond(NOT_AVAILABLE, "the stream is not available yet"))
+    context: Context = socket.app.state.context
+    try:
+        context.sessions.find(session_id)
+    except NoSuchSessionError as error:
+        await socket.send_denial_response(respond(NO_SUCH_SESSION, str(error)))
+    else:
+        await socket.send_denial_response(respond(NOT_AVAILABLE, "the stream is not available yet"))

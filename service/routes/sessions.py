@@ -32,10 +32,10 @@ async def open_session(
     limits.check_solver(settings)
     scene = await asyncio.to_thread(_scene, body, limits.scene_limits)
     opening = Open(scene, settings, limits.scene_limits, limits.frame_limits)
-    session = await context.sessions.open(opening)
+    session, status = await context.sessions.open(opening)
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
-    return SessionStatus.of(session.id, await session.worker.call(GetStatus()))
+    return SessionStatus.of(session.id, status)
 
 
 def _scene(body: SessionRequest, limits: SceneLimits) -> Scene:

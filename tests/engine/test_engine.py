@@ -96,7 +96,8 @@ def test_an_engine_starts_unsolved_and_converges(engine: Engine) -> None:
     assert not engine.step(0.1), "nothing is left to do"
 
 
-def test_progress_never_goes_back(engine: Engine) -> None:
+def test_progress_never_goes_back(drawing: Drawing) -> None:
+    engine = Engine(box(), SolverSettings(error_tolerance=0.005), drawing=drawing)
     told = [engine.status().progress]
     while engine.step(0.001):
         told.append(engine.status().progress)
@@ -278,7 +279,7 @@ def test_flat_and_gouraud_agree_on_the_whole(settled: Engine) -> None:
 def test_the_witness_sees_what_the_solve_does(drawing: Drawing) -> None:
     """Frames come nearer to the path-traced one as the tolerance falls."""
     differences = []
-    for tolerance in (0.05, 0.01):
+    for tolerance in (0.05, 0.005):
         engine = Engine(box(), SolverSettings(error_tolerance=tolerance), drawing=drawing)
         settle(engine)
         request = FrameRequest(renderer=RendererName.PATH, samples=256)
@@ -370,7 +371,8 @@ def test_a_probe_under_the_lamp_is_lambert_s_formula(settled: Engine) -> None:
     # The crate hangs aside, and what it reflects is little.
     assert result.irradiance[0] == pytest.approx(direct, rel=0.05)
     assert result.illuminance[0] == pytest.approx(179.0 * (result.irradiance[0] @ LUMINANCE_WEIGHTS))
-    assert np.all(result.irradiance[1] < 0.2 * direct), "looking down, only the floor's light arrives"
+    # Looking down from 10 cm, it sees little but the floor, of reflectance 0.6, 0.4, 0.2.
+    assert result.irradiance[1] == pytest.approx(np.array([0.6, 0.4, 0.2]) * direct, rel=0.1)
     assert result.revision == 1
     assert np.all(result.error_estimate >= 0.0)
 
