@@ -13,12 +13,10 @@ from solver.transport.field import SolveOutcome
 from solver.transport.linking import Light, Linker
 from solver.transport.links import LinkBatch
 from solver.transport.oracle import MAX_SAMPLES, RESAMPLE, SPLIT_P, SPLIT_Q, child_pairs, threshold_for_share
+from solver.transport.pace import Pace
 from solver.transport.settings import SolverSettings
 from solver.transport.state import TransportState
 from solver.types import BoolArray, IntArray
-
-PAIRS_AT_ONCE: Final = 2048
-"""Links evaluated between two yields."""
 
 NOISE_SHARE: Final = 0.5
 """Noise that fresh links may have, of the least error that is refined in the same round."""
@@ -69,7 +67,9 @@ def choose(
     return Choice(chosen.astype(np.int32), action, bound)
 
 
-def refine(state: TransportState, linker: Linker, light: Light, choice: Choice) -> Iterator[LinkBatch]:
+def refine(
+    state: TransportState, linker: Linker, pace: Pace, light: Light, choice: Choice
+) -> Iterator[LinkBatch]:
     """Replace the chosen links by better ones; yields the batches as they are made."""
     tree, links = state.tree, state.links
     chosen, action = choice.links, choice.action
@@ -92,15 +92,14 @@ def refine(state: TransportState, linker: Linker, light: Light, choice: Choice) 
     least = np.where(action == RESAMPLE, 4 * samples, 1).astype(np.int32)
     start, count, pool = links.blocker_start[chosen], links.blocker_count[chosen], links.pool
     batches = []
-    for first in range(0, total, PAIRS_AT_ONCE):
-        part = slice(first, first + PAIRS_AT_ONCE)
+    # A pair costs about as much as 8 rays and its blockers.
+    for part in pace.batches((1 + 2 * least[origin] + count[origin] // 4).astype(np.int64)):
         source = origin[part]
-        batches.append(
-            linker.link_children(
-                tree, new_p[part], new_q[part], start[source], count[source], pool, least[source], light
-            )
+        batch = linker.link_children(
+            tree, new_p[part], new_q[part], start[source], count[source], pool, least[source], light
         )
-        yield batches[-1]
+        batches.append(batch)
+        yield batch
     gone = np.zeros(len(links), dtype=bool)
     gone[chosen] = True
     links.remove(gone)

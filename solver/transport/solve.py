@@ -24,13 +24,17 @@ from solver.transport.gather import irradiance_at
 from solver.transport.linking import Light, Linker
 from solver.transport.links import LinkBatch
 from solver.transport.pushpull import means
-from solver.transport.refine import PAIRS_AT_ONCE, choose, refine
+from solver.transport.pace import Pace
+from solver.transport.refine import choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
 from solver.types import FloatArray, Points, Spectra
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import FULL, NONE, PARTIAL
+
+_FACING_AT_ONCE: Final = 1 << 18
+"""Pairs of patches looked at between two yields."""
 
 _PROBE_RAYS: Final = 1 << 20
 _LEAST_RAYS: Final = 128
@@ -87,6 +91,7 @@ class RadiositySolver:
         """Counts the changes of the field."""
         self._rays = rays
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
+        self._pace = Pace()
         self._state = TransportState.of(surfaces)
         self._closed = False
         if warm_start is not None:
@@ -184,6 +189,7 @@ class RadiositySolver:
     def _run(self) -> Iterator[bool]:
         yield from self._link_patches()
         self._closed = is_closed(self.surfaces, self._rays)
+        yield True
         tolerance = self.settings.error_tolerance
         state = self._state
         while True:
@@ -208,7 +214,8 @@ class RadiositySolver:
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
                 return
-            for batch in refine(state, self._linker, estimate.light, choice):
+            yield True
+            for batch in refine(state, self._linker, self._pace, estimate.light, choice):
                 self._count(batch)
                 yield True
 
@@ -222,13 +229,12 @@ class RadiositySolver:
 
     def _link_patches(self) -> Iterator[bool]:
         n = self.surfaces.patch_count
-        rows = max(1, min(n, (1 << 21) // max(n, 1)))
+        rows = max(1, min(n, _FACING_AT_ONCE // max(n, 1)))
         light = Light(np.zeros(n), np.zeros(n), 1.0)
         for start in range(0, n, rows):
             p, q = self._linker.facing_pairs(start, min(start + rows, n))
             yield True
-            for first in range(0, len(p), PAIRS_AT_ONCE):
-                part = slice(first, first + PAIRS_AT_ONCE)
+            for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
                 batch = self._linker.link_patches(self._state.tree, p[part], q[part], light)
                 self._state.links.append(batch)
                 self._count(batch)

@@ -1,0 +1,39 @@
+"""How much to do between two yields: batches sized by the time that the last ones took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from solver.types import Int64Array
+
+SLICE: Final = 0.008
+"""Seconds that a batch should take."""
+
+_FIRST: Final = 512.0
+_LEAST: Final = 32.0
+_MOST: Final = 32768.0
+
+
+class Pace:
+    """Cuts ranges of work into batches; the time between two batches counts for the first of them."""
+
+    def __init__(self) -> None:
+        self._cost = _FIRST
+
+    def batches(self, costs: Int64Array) -> Iterator[slice]:
+        """Slices of a range of items with `costs` (n,) relative to each other, in order."""
+        ends = np.cumsum(costs)
+        first = 0
+        while first < len(costs):
+            done = int(ends[first - 1]) if first else 0
+            last = max(first + 1, int(np.searchsorted(ends, done + self._cost, side="right")))
+            start = time.perf_counter()
+            yield slice(first, last)
+            seconds = time.perf_counter() - start
+            rate = (int(ends[last - 1]) - done) / max(seconds, 1e-6)
+            self._cost = min(_MOST, max(_LEAST, min(2.0 * self._cost, SLICE * rate)))
+            first = last
