@@ -23,8 +23,8 @@ from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.gather import irradiance_at
 from solver.transport.linking import Light, Linker
 from solver.transport.links import LinkBatch
-from solver.transport.pushpull import means
 from solver.transport.pace import Pace
+from solver.transport.pushpull import means
 from solver.transport.refine import choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
