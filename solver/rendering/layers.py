@@ -103,8 +103,9 @@ def _scaled_positions(position: Float32Array) -> ByteArray:
 
 
 def _hashed_colours(numbers: AnyArray) -> ByteArray:
-    mixed = ((numbers[:, :, None].astype(np.int64) + 1).astype(np.uint64) * _HASH) & np.uint64(0xFFFFFFFF)
-    mixed ^= mixed >> np.uint64(15)
-    mixed = (mixed * _HASH[::-1]) & np.uint64(0xFFFFFFFF)
-    spread = _DARKEST + (mixed >> np.uint64(24)) * np.uint64(255 - _DARKEST) // np.uint64(255)
+    mixed = (numbers[:, :, None].astype(np.int64) + 1).astype(np.uint64)
+    for shift in (15, 13, 16):
+        mixed = (mixed * _HASH) & np.uint64(0xFFFFFFFF)
+        mixed ^= mixed >> np.uint64(shift)
+    spread = _DARKEST + (mixed & np.uint64(255)) * np.uint64(255 - _DARKEST) // np.uint64(255)
     return np.where(numbers[:, :, None] >= 0, spread, 0).astype(np.uint8)

@@ -51,7 +51,7 @@ class FrameRenderer:
         radiance (h, w, 3) float32 W/(m2 sr), irradiance (h, w, 3) float32 and illuminance (h, w) float32
         W/m2: 0 where nothing is seen or only the black back of a face, the mean of `samples` points of each
         pixel. The other layers take the pixel's centre: depth (h, w) float32 metres along the viewing
-        direction, infinite where nothing is seen; position (h, w, 3) float32 metres, NaN; normal (h, w, 3)
+        direction, infinite where nothing is seen; position (h, w, 3) float64 metres, NaN; normal (h, w, 3)
         float32, 0; object (h, w) int32 and element (h, w) int32, -1. Backs have the normal of their front.
 
         The mesh stays on the device for as long as the same object is drawn. Raises LimitExceededError or
@@ -124,7 +124,7 @@ def _geometry(identity: IntArray, mesh: RenderMesh, camera: Camera, layer: Layer
         case Layer.DEPTH:
             return geometry_layers.depths(identity, mesh, camera).astype(np.float32)
         case Layer.POSITION:
-            return geometry_layers.positions(identity, mesh, camera).astype(np.float32)
+            return geometry_layers.positions(identity, mesh, camera)
         case Layer.NORMAL:
             return geometry_layers.normals(identity, mesh)
         case Layer.OBJECT:
