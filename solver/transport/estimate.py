@@ -23,7 +23,7 @@ from solver.transport.pushpull import pull
 from solver.transport.state import TransportState
 from solver.types import FloatArray
 
-LEAF: Final = 0.1
+LEAF: Final = 0.15
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
 
 
