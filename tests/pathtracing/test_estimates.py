@@ -94,7 +94,7 @@ def test_samples_must_be_positive() -> None:
 
 def test_standard_errors_are_calibrated() -> None:
     """Errors over standard errors, of many estimates of one known value, are distributed as Student's t."""
-    mean, error = cube(*LIT).irradiance(*floor_points(3000), PASSES * 64)
+    mean, error = cube(*LIT).irradiance(*floor_points(3000), PASSES * 16)
     z = (mean[:, 0] - FLOOR_MIDDLE) / error[:, 0]
     assert stats.kstest(z, stats.t(PASSES - 1).cdf).pvalue > 0.01
     # The two ways to tell the spread agree: between estimates, and what each says of itself.
@@ -113,7 +113,7 @@ def test_items_are_independent() -> None:
 
 def test_error_falls_with_samples_at_least_as_chance_would() -> None:
     of = cube(*LIT)
-    samples = np.array([PASSES * 4, PASSES * 16, PASSES * 64, PASSES * 256])
+    samples = PASSES * np.array([1, 4, 16, 64])
     told = [np.sqrt((of.irradiance(*floor_points(200), int(n))[1] ** 2).mean()) for n in samples]
     order = np.polyfit(np.log(samples), np.log(told), 1)[0]
     assert order < -0.5

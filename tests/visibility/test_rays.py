@@ -17,7 +17,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(soups(anywhere=True), SEEDS)
 def test_occlusion_is_that_of_brute_force(soup: Soup, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -28,7 +28,7 @@ def test_occlusion_is_that_of_brute_force(soup: Soup, seed: int) -> None:
     np.testing.assert_array_equal(soup.rays.occluded(start, end)[clear], margin[clear] > 0.0)
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(soups(anywhere=True), SEEDS)
 def test_first_hits_are_those_of_brute_force(soup: Soup, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -99,7 +99,7 @@ def reaches_into_hull(first: Points, second: Points, polygon: Points) -> bool:
     return bool(found.status == 0)
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(soups(anywhere=True))
 def test_classes_and_blockers_of_patches(soup: Soup) -> None:
     found = classify(soup)
