@@ -52,7 +52,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
 @asynccontextmanager
 async def _life(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    await context.pool.fill()
+    await context.pool.begin()
     expiring = asyncio.create_task(context.sessions.expire_forever())
     try:
         yield

@@ -37,7 +37,7 @@ class ServiceSettings(BaseSettings):
     token: SecretStr | None = Field(
         default=None, min_length=1, description="Where given, /v1 and /metrics ask for it as a bearer token."
     )
-    pool_size: int = Field(default=1, ge=0, le=64, description="Workers kept warm for the next sessions.")
+    pool_size: int = Field(default=2, ge=0, le=64, description="Workers kept warm for the next sessions.")
     refill_delay: float = Field(
         default=1.0,
         ge=0.0,

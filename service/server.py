@@ -33,8 +33,8 @@ class Server(uvicorn.Server):
         self._address = address
 
     async def run_on(self, listening: socket.socket) -> None:
-        """Serve on a socket, once the workers are warm. Raises WorkerNotStartedError."""
-        await self._context.pool.fill()
+        """Serve on a socket, once a worker is warm. Raises WorkerNotStartedError."""
+        await self._context.pool.begin()
         await self.serve([listening])
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:

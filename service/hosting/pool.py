@@ -30,6 +30,12 @@ class WorkerPool:
         """Workers that wait for a session."""
         return len(self._stock)
 
+    async def begin(self) -> None:
+        """Start the first worker, and the others in the background. Raises WorkerNotStartedError."""
+        if self._size > 0 and not self._stock:
+            self._stock.append(await RemoteWorker.start(self._on_lost))
+            self._refill_later()
+
     async def fill(self) -> None:
         """Start workers until the stock is complete. Raises WorkerNotStartedError."""
         while len(self._stock) < self._size and not self._closed:
