@@ -58,7 +58,7 @@ class LimitExceededError(SolverError):
         self.what = what
         self.value = value
         self.limit = limit
-        super().__init__(f"{what}: {value:g} exceeds the limit of {limit:g}")
+        super().__init__(f"{what}: {value:,} exceeds the limit of {limit:,}")
 
 
 class RenderingUnavailableError(SolverError):

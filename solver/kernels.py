@@ -2,14 +2,22 @@
 
 `fastmath` is never used, since NaN and sign decide outcomes in most kernels; `parallel=True` is not
 used either: kernels take a range and `solver.parallel` spreads ranges over threads.
+
+numba keeps a kernel's machine code for as long as the kernel's own file does not change. The code of
+kernels that it calls, and module constants, go into it too, wherever they are written: here they are part
+of the stamp by which a kept kernel is known to be fresh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
+from numba.core.dispatcher import Dispatcher
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -17,12 +25,38 @@ R = TypeVar("R")
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` on first call for its argument types; the machine code is cached on disk."""
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    return cast("Callable[P, R]", _compiled(function))
 
 
 def inline_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, for small functions called inside other kernels: LLVM is asked to inline them."""
-    return cast(
-        "Callable[P, R]",
-        numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function),
+    return cast("Callable[P, R]", _compiled(function, forceinline=True))
+
+
+def _compiled(function: Callable[..., object], forceinline: bool = False) -> Any:
+    dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=forceinline)(
+        function
     )
+    kept = dispatcher._cache._cache_file
+    kept._source_stamp = (kept._source_stamp, _ingredients(cast("FunctionType", function)))
+    return dispatcher
+
+
+def _ingredients(function: FunctionType) -> tuple[tuple[str, Any], ...]:
+    """Name and stamp of all that a kernel takes from its module, but for what is numpy's or Python's."""
+    known = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
+    return tuple((name, stamp) for name, value in known if (stamp := _stamp(value)) is not None)
+
+
+def _stamp(value: Any) -> Any:
+    if isinstance(value, Dispatcher):
+        return cast("Any", value)._cache._cache_file._source_stamp
+    match value:
+        case int() | float() | tuple() | np.generic():
+            return repr(value)
+        case np.ndarray():
+            return value.dtype.str, value.shape, value.tobytes()
+        case ModuleType() if value.__name__.startswith("solver."):
+            return Path(str(value.__file__)).read_bytes()
+        case _:
+            return None

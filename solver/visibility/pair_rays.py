@@ -109,10 +109,11 @@ def generate_rays(
         ray = (link - first) * STRATA * samples
         for s in range(STRATA * samples):
             stratum = s % STRATA
-            u1 = 0.5 * ((stratum & 1) + (shift[0] + (s + 1) * _STEP[0]) % 1.0)
-            v1 = 0.5 * (((stratum >> 1) & 1) + (shift[1] + (s + 1) * _STEP[1]) % 1.0)
-            u2 = 0.5 * (((stratum >> 2) & 1) + (shift[2] + (s + 1) * _STEP[2]) % 1.0)
-            v2 = 0.5 * (((stratum >> 3) & 1) + (shift[3] + (s + 1) * _STEP[3]) % 1.0)
+            index = stratum * samples + s // STRATA + 1
+            u1 = 0.5 * ((stratum & 1) + (shift[0] + index * _STEP[0]) % 1.0)
+            v1 = 0.5 * (((stratum >> 1) & 1) + (shift[1] + index * _STEP[1]) % 1.0)
+            u2 = 0.5 * (((stratum >> 2) & 1) + (shift[2] + index * _STEP[2]) % 1.0)
+            v2 = 0.5 * (((stratum >> 3) & 1) + (shift[3] + index * _STEP[3]) % 1.0)
             weight = sample_element(corners[i], counts[i], n1, area[i], u1, v1, x)
             if close:
                 weight *= sample_by_solid_angle(corners[j], counts[j], n2, x, u2, v2, work, y)
