@@ -12,8 +12,8 @@ exactly for what is rebuilt here. The steps, all in the plane of the patch:
    curvature of the next ones taken out, (7 (a + b) - (z + c)) / 12 in one dimension: exact for cubics
    where a plain average is exact only for linear fields;
 4. the value is kept within the means of the incident leaves, so that it does not swing beside a shadow
-   edge. P is always allowed, since it is what extrapolates a gradient to the border of the patch, by
-   no more than the leaves around differ. Nothing is negative.
+   edge. On the border of the patch P is always allowed, since it is what extrapolates a gradient to
+   there, by no more than the leaves around differ. Nothing is negative.
 
 P and G are exact for linear fields on any mesh, and so is the value.
 """
@@ -29,7 +29,7 @@ from solver.kernels import inline_kernel, kernel
 from solver.parallel import core_count, run_chunks
 from solver.rendering.topology import Topology
 from solver.transport.field import RadiosityField
-from solver.types import FloatArray, IntArray
+from solver.types import BoolArray, FloatArray, IntArray
 
 _CHUNK: Final = 2048
 """Leaves or vertices below which a second thread is not worth its while."""
@@ -50,6 +50,10 @@ def vertex_irradiance(field: RadiosityField, surfaces: Surfaces, topology: Topol
     spread = np.zeros((n, 3))
     values = np.empty((v, 3))
     t = topology
+    on_border = np.zeros(v, dtype=np.bool_)
+    leaf, slot = t.border >> 2, t.border & 3
+    on_border[t.vertex[leaf, slot]] = True
+    on_border[t.vertex[leaf, (slot + 1) % field.corner_count[leaf]]] = True
 
     def flatten(start: int, stop: int) -> None:
         _flatten(
@@ -65,18 +69,9 @@ def vertex_irradiance(field: RadiosityField, surfaces: Surfaces, topology: Topol
 
     def evaluate(start: int, stop: int) -> None:
         _evaluate(
-            start,
-            stop,
-            t.leaf_start,
-            t.leaf_edge,
-            t.hanging_on,
-            flat,
-            centroid,
-            means,
-            gradient,
-            spread,
-            values,
-        )
+            start, stop, t.leaf_start, t.leaf_edge, t.hanging_on, on_border, flat, centroid, means,
+            gradient, spread, values,
+        )  # fmt: skip
 
     for work, count in ((flatten, n), (fit, n), (evaluate, v)):
         run_chunks(work, count, max(_CHUNK, -(-count // core_count())))
@@ -214,6 +209,7 @@ def _evaluate(
     leaf_start: IntArray,
     leaf_edge: IntArray,
     hanging_on: IntArray,
+    on_border: BoolArray,
     flat: FloatArray,
     centroid: FloatArray,
     means: FloatArray,
@@ -261,5 +257,7 @@ def _evaluate(
             carried = min(max(carried, -reach[c]), reach[c])
             p = mean[c] / total + carried
             value = (p + 2.0 * planes[c] / total) / 3.0
-            value = min(max(value, min(low[c], p)), max(high[c], p))
-            values[v, c] = max(value, 0.0)
+            if on_border[v]:
+                low[c] = max(min(low[c], p), 0.0)
+                high[c] = max(high[c], p)
+            values[v, c] = min(max(value, low[c]), high[c])
