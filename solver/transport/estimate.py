@@ -23,7 +23,7 @@ from solver.transport.pushpull import pull
 from solver.transport.state import TransportState
 from solver.types import FloatArray
 
-LEAF: Final = 0.15
+LEAF: Final = 0.2
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
 
 

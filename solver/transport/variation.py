@@ -97,11 +97,12 @@ def form_factor_variation(
         dy = source_centroid[1] - y
         dz = source_centroid[2] - z
         square = dx * dx + dy * dy + dz * dz
+        cosine1 = dx * normal[0] + dy * normal[1] + dz * normal[2]
+        cosine2 = -(dx * source_normal[0] + dy * source_normal[1] + dz * source_normal[2])
         value = 0.0
-        if square > 9.0 * radius2:
-            cosine1 = dx * normal[0] + dy * normal[1] + dz * normal[2]
-            cosine2 = -(dx * source_normal[0] + dy * source_normal[1] + dz * source_normal[2])
-            if cosine1 > 0.0 and cosine2 > 0.0:
+        if square > 9.0 * radius2 and cosine1 > 0.0 and cosine1 * cosine1 > radius2:
+            # Far away, and wholly above the horizon.
+            if cosine2 > 0.0:
                 value = cosine1 * cosine2 * source_area / (math.pi * square * square)
         else:
             value = point_form_factor(x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch)
