@@ -1,0 +1,135 @@
+"""The link table, and the links of a solve: each pair of points has exactly one."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from solver.transport.links import LinkBatch, LinkTable, ragged_indices
+from solver.types import IntArray
+from solver.visibility.shafts import FULL, NONE, PARTIAL
+from tests.transport.solving import shelf, solved, state_of
+
+COLUMNS = ("p", "q", "open_exchange", "visibility", "samples", "noise", "kind", "slope_p", "slope_q")
+
+
+def batch(random: np.random.Generator, n: int) -> LinkBatch:
+    counts = random.integers(0, 5, n).astype(np.int32)
+    return LinkBatch(
+        p=random.integers(0, 100, n).astype(np.int32),
+        q=random.integers(0, 100, n).astype(np.int32),
+        open_exchange=random.random(n),
+        visibility=random.random(n),
+        samples=random.integers(0, 64, n).astype(np.int32),
+        noise=random.random(n),
+        kind=random.integers(0, 3, n).astype(np.int32),
+        slope_p=random.random((n, 2)),
+        slope_q=random.random((n, 2)),
+        residual_p=random.random(n),
+        residual_q=random.random(n),
+        blocker_count=counts,
+        blockers=random.integers(0, 1000, int(counts.sum())).astype(np.int32),
+    )
+
+
+def blockers(table: LinkTable) -> list[list[int]]:
+    return [
+        table.pool[start : start + count].tolist()
+        for start, count in zip(table.blocker_start, table.blocker_count, strict=True)
+    ]
+
+
+def lists(of: LinkBatch) -> list[list[int]]:
+    ends = np.cumsum(of.blocker_count)
+    return [part.tolist() for part in np.split(of.blockers, ends[:-1])]
+
+
+@settings(max_examples=30)
+@given(
+    seed=st.integers(0, 1 << 30), steps=st.lists(st.tuples(st.integers(1, 3000), st.floats(0, 1)), max_size=6)
+)
+def test_table_holds_what_was_appended_and_not_removed(seed: int, steps: list[tuple[int, float]]) -> None:
+    random = np.random.default_rng(seed)
+    table = LinkTable()
+    rows: dict[str, list[object]] = {name: [] for name in COLUMNS}
+    expected: list[list[int]] = []
+    for count, share in steps:
+        fresh = batch(random, count)
+        table.append(fresh)
+        for name in COLUMNS:
+            rows[name].extend(getattr(fresh, name).tolist())
+        expected.extend(lists(fresh))
+        gone = random.random(len(table)) < share
+        table.remove(gone)
+        keep = np.flatnonzero(~gone)
+        for name in COLUMNS:
+            rows[name] = [rows[name][k] for k in keep]
+        expected = [expected[k] for k in keep]
+        assert len(table) == len(expected)
+        assert blockers(table) == expected
+    for name in COLUMNS:
+        assert getattr(table, name).tolist() == rows[name]
+    np.testing.assert_array_equal(table.exchange, table.open_exchange * table.visibility)
+
+
+def test_stale_blockers_do_not_pile_up() -> None:
+    random = np.random.default_rng(1)
+    table = LinkTable()
+    for _ in range(30):
+        table.append(batch(random, 3000))
+        table.remove(random.random(len(table)) < 0.9)
+    assert len(table.pool) <= 2 * table.blocker_count.sum() + 4096 + 5 * 3000
+    assert table.nbytes < 4e6
+
+
+def test_ragged_indices() -> None:
+    start = np.array([5, 0, 7, 2], dtype=np.int64)
+    count: IntArray = np.array([2, 0, 3, 1], dtype=np.int32)
+    assert ragged_indices(start, count).tolist() == [5, 6, 7, 8, 9, 2]
+    assert len(ragged_indices(start[:0], count[:0])) == 0
+
+
+def test_every_pair_of_leaves_has_one_link() -> None:
+    """Of any two facing leaves, exactly one link joins the ancestors (or selves) of both."""
+    state = state_of(solved(shelf(), 0.1))
+    tree, links = state.tree, state.links
+    n = len(tree)
+    linked = np.zeros((n, n), dtype=np.int64)
+    np.add.at(linked, (links.p, links.q), 1)
+    np.add.at(linked, (links.q, links.p), 1)
+    # Push down: a link of a parent is one of its children.
+    for e in range(n):
+        if tree.parent[e] >= 0:
+            linked[e] += linked[tree.parent[e]]
+    for e in range(n):
+        if tree.parent[e] >= 0:
+            linked[:, e] += linked[:, tree.parent[e]]
+    leaf = tree.leaves
+    pairs = linked[np.ix_(leaf, leaf)]
+    assert pairs.max() == 1
+    patch = tree.patch[leaf]
+    assert not pairs[patch[:, None] == patch[None]].any()
+    heights = np.einsum(
+        "pqkx,px->pqk",
+        tree.corners[leaf][None] - tree.corners[leaf][:, None, :1],
+        tree.patch_normal[patch],
+    )
+    front = np.all(heights > 1e-6, axis=2)
+    assert np.all(pairs[front & front.T] == 1), "leaves that see each other are linked"
+
+
+def test_exchange_is_at_most_either_area_and_kinds_tell_visibility() -> None:
+    state = state_of(solved(shelf()))
+    links = state.links
+    assert set(np.unique(links.kind)) == {FULL, PARTIAL, NONE}
+    smaller = np.minimum(state.tree.area[links.p], state.tree.area[links.q])
+    assert np.all(links.open_exchange <= smaller * (1 + 1e-4))
+    assert np.all(links.visibility[links.kind == FULL] == 1.0)
+    assert np.all(links.visibility[links.kind == NONE] == 0.0)
+    assert np.all((links.visibility >= 0.0) & (links.visibility <= 1.0))
+    partial = links.kind == PARTIAL
+    assert np.all(links.samples[~partial] == 0)
+    assert np.all(links.samples[partial] > 0)
+    assert np.all(links.blocker_count[partial] > 0)
+    assert not links.noise[~partial].any()
