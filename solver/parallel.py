@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
+from typing import Final
+
+_PIECES_PER_CORE: Final = 3
+"""Pieces into which a small range is cut, so that cores end at about the same time."""
 
 
+@cache
 def core_count() -> int:
     """Number of cores this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
@@ -15,23 +22,37 @@ def core_count() -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=core_count(), thread_name_prefix="halflight-kernel")
+    return ThreadPoolExecutor(max_workers=max(1, core_count() - 1), thread_name_prefix="halflight-kernel")
 
 
-def run_chunks(work: Callable[[int, int], object], count: int, chunk: int) -> None:
+def run_chunks(work: Callable[[int, int], object], count: int, chunk: int, least: int | None = None) -> None:
     """Call `work(start, stop)` over [0, count) in pieces of at most `chunk`, on all cores.
 
-    `work` must write to disjoint outputs for disjoint ranges. A range of one piece runs in the caller.
-    The first exception raised by a piece is raised here after all pieces have ended.
+    A range of few chunks is cut finer, into pieces of at least `least`, where given, so that all cores
+    have some. `work` must write to disjoint outputs for disjoint ranges. The caller works too; the first
+    exception raised by a piece is raised here after all pieces have ended.
     """
     if count <= 0:
         return
-    pieces = [(start, min(start + chunk, count)) for start in range(0, count, chunk)]
-    if len(pieces) == 1 or core_count() == 1:
-        for start, stop in pieces:
+    number = -(-count // chunk)
+    if least is not None:
+        number = max(number, min(_PIECES_PER_CORE * core_count(), count // least))
+    helpers = min(core_count(), number) - 1
+    bounds = [count * k // number for k in range(number + 1)]
+    pieces = deque(pairwise(bounds))
+
+    def drain() -> None:
+        while True:
+            try:
+                start, stop = pieces.popleft()
+            except IndexError:
+                return
             work(start, stop)
-        return
-    futures = [_pool().submit(work, start, stop) for start, stop in pieces]
-    errors = [error for future in futures if (error := future.exception()) is not None]
+
+    futures = [_pool().submit(drain) for _ in range(helpers)]
+    try:
+        drain()
+    finally:
+        errors = [error for future in futures if (error := future.exception()) is not None]
     if errors:
         raise errors[0]

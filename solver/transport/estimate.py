@@ -84,7 +84,7 @@ def estimate_error(state: TransportState) -> ErrorEstimate:
             errors[SPLIT_Q], errors[RESAMPLE],
         )  # fmt: skip
 
-    run_chunks(work, len(links), 1 << 15)
+    run_chunks(work, len(links), 1 << 15, 1 << 12)
     reflected = luminance[leaf, 0] - (state.emission @ state.weights)[tree.patch[leaf]]
     return ErrorEstimate(
         links=errors,

@@ -53,11 +53,11 @@ def irradiance_at(
                 luminance, spread, write, start, stop, total, slot, element, factor,
             )  # fmt: skip
 
-        run_chunks(lambda a, b: collect(a, b, False, count, empty, nothing), len(x), 16)  # noqa: B023
+        run_chunks(lambda a, b: collect(a, b, False, count, empty, nothing), len(x), 16, 1)  # noqa: B023
         slot = np.cumsum(count) - count
         entries = int(count.sum())
         element, factor = np.empty(entries, dtype=np.int32), np.empty(entries)
-        run_chunks(lambda a, b: collect(a, b, True, slot, element, factor), len(x), 16)  # noqa: B023
+        run_chunks(lambda a, b: collect(a, b, True, slot, element, factor), len(x), 16, 1)  # noqa: B023
         point = np.repeat(np.arange(len(x)), count)
         share = factor * luminance[element] / np.maximum(total[point], 1e-300)
         samples = 1 + (share * rays_per_point).astype(np.int64)
@@ -78,7 +78,7 @@ def irradiance_at(
                 rays.scale, rays.offset, start, stop, origins, directions, weights, seen,
             )  # fmt: skip
 
-        run_chunks(generate, entries, 512)
+        run_chunks(generate, entries, 512, 32)
         blocked = rays.occluded_local(origins, directions)
         variance = np.zeros(len(x))
         add_up(

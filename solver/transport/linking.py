@@ -25,6 +25,7 @@ from solver.visibility.rays import RayScene
 from solver.visibility.shafts import NONE, PARTIAL, first_blockers
 
 _CHUNK: Final = 256
+_LEAST: Final = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ class Linker:
             list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
                     counts, False, empty, empty)  # fmt: skip
 
-        run_chunks(count, stop - start, 64)
+        run_chunks(count, stop - start, 64, 8)
         total = int(counts.sum())
         p, q = np.empty(total, dtype=np.int32), np.empty(total, dtype=np.int32)
         first = np.cumsum(counts) - counts
@@ -82,7 +83,7 @@ class Linker:
             list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
                     first, True, p, q)  # fmt: skip
 
-        run_chunks(fill, stop - start, 64)
+        run_chunks(fill, stop - start, 64, 8)
         return p, q
 
     def link_patches(self, tree: ElementTree, p: IntArray, q: IntArray, light: Light) -> LinkBatch:
@@ -107,7 +108,7 @@ class Linker:
                 at += done
             lists[start] = pieces
 
-        run_chunks(work, n, _CHUNK)
+        run_chunks(work, n, _CHUNK, _LEAST)
         pool = np.concatenate([piece for start in sorted(lists) for piece in lists[start]] or [kept[:0]])
         return self._evaluate(tree, p, q, kind, kept, pool, np.ones(n, dtype=np.int32), light)
 
@@ -136,7 +137,7 @@ class Linker:
                 kept,
             )  # fmt: skip
 
-        run_chunks(work, n, _CHUNK)
+        run_chunks(work, n, _CHUNK, _LEAST)
         return self._evaluate(tree, p, q, kind, kept, loose[ragged_indices(room, kept)], least_samples, light)
 
     def _evaluate(
@@ -161,7 +162,7 @@ class Linker:
                 start, stop, open_exchange, position[0], position[1], residual[0], residual[1],
             )  # fmt: skip
 
-        run_chunks(work, n, _CHUNK)
+        run_chunks(work, n, _CHUNK, _LEAST)
         visibility = np.where(kind == NONE, 0.0, 1.0)
         samples, noise = np.zeros(n, dtype=np.int32), np.zeros(n)
         partial = np.flatnonzero((kind == PARTIAL) & (open_exchange > 0.0))

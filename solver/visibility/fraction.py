@@ -31,6 +31,7 @@ BATCH: Final = 1 << 17
 """Rays generated and traced at a time, which bounds memory."""
 
 _CHUNK: Final = 512
+_LEAST: Final = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +191,7 @@ def visible_fractions(
                 rays.offset, first, first + start, first + stop, origins, directions, weights, strata, places,
             )  # fmt: skip
 
-        run_chunks(generate, last - first, _CHUNK)
+        run_chunks(generate, last - first, _CHUNK, max(1, _LEAST // samples))
         blocked = rays.occluded_local(origins, directions)
         _reduce(
             samples, first, p, q, moment, first, last, weights, strata, places, blocked, result.visibility,

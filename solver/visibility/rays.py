@@ -18,6 +18,7 @@ from solver import tolerances
 from solver.parallel import run_chunks
 from solver.types import BoolArray, Float32Array, FloatArray, IntArray, Points, Vector
 
+_LEAST: Final = 512
 CHUNK: Final = 16384
 """Rays per Embree call: large enough to hide the 9 us of a call, small enough to balance the cores."""
 
@@ -74,7 +75,7 @@ class RayScene:
             )
             blocked[start:stop] = found >= 0
 
-        run_chunks(query, len(origins), CHUNK)
+        run_chunks(query, len(origins), CHUNK, _LEAST)
         return blocked
 
     def occluded(self, origins: Points, targets: Points) -> BoolArray:
@@ -97,5 +98,5 @@ class RayScene:
             triangle[start:stop] = hit
             distance[start:stop] = np.where(hit >= 0, found["tfar"], np.inf)
 
-        run_chunks(query, len(origins), CHUNK)
+        run_chunks(query, len(origins), CHUNK, _LEAST)
         return Hits(triangle, distance)
