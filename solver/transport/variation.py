@@ -72,6 +72,7 @@ def form_factor_variation(
     total = 0.0
     mean_u = 0.0
     mean_v = 0.0
+    weight = 1.0
     for k in range(count + 1):
         if k == count:
             x = centroid[0]
@@ -87,6 +88,7 @@ def form_factor_variation(
             x = wk * receiver[k, 0] + ws * (receiver[m, 0] + receiver[n, 0]) + wo * receiver[o, 0]
             y = wk * receiver[k, 1] + ws * (receiver[m, 1] + receiver[n, 1]) + wo * receiver[o, 1]
             z = wk * receiver[k, 2] + ws * (receiver[m, 2] + receiver[n, 2]) + wo * receiver[o, 2]
+            weight = (1.0 - 2.0 * _GAUSS) * _corner_jacobian(receiver, k, m, n, normal) / area + 2.0 * _GAUSS
         else:
             m = (k + 1) % 3
             o = (k + 2) % 3
@@ -109,12 +111,12 @@ def form_factor_variation(
         if k == count:
             middle = value
             continue
-        total += value
+        total += weight * value
         x -= centroid[0]
         y -= centroid[1]
         z -= centroid[2]
-        mean_u += value * (x * u[0] + y * u[1] + z * u[2])
-        mean_v += value * (x * v[0] + y * v[1] + z * v[2])
+        mean_u += weight * value * (x * u[0] + y * u[1] + z * u[2])
+        mean_v += weight * value * (x * v[0] + y * v[1] + z * v[2])
         if k == 0:
             value0 = value
         elif k == 1:
@@ -162,6 +164,23 @@ def form_factor_variation(
     position[0] = mean_u
     position[1] = mean_v
     return math.sqrt(max(residual, (_LEAST * linear / mean) ** 2 if mean > 0.0 else 0.0))
+
+
+@kernel
+def _corner_jacobian(polygon: FloatArray, k: int, m: int, n: int, normal: FloatArray) -> float:
+    """Twice the area (m2) that corner k spans with its neighbours m and n.
+
+    The Jacobian of a planar bilinear patch at that corner; linear over the patch, with the area as mean.
+    """
+    ax = polygon[m, 0] - polygon[k, 0]
+    ay = polygon[m, 1] - polygon[k, 1]
+    az = polygon[m, 2] - polygon[k, 2]
+    bx = polygon[n, 0] - polygon[k, 0]
+    by = polygon[n, 1] - polygon[k, 1]
+    bz = polygon[n, 2] - polygon[k, 2]
+    return float(
+        (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
+    )
 
 
 @kernel
