@@ -21,6 +21,10 @@ class SolveOutcome(Enum):
         "No link errs by more than transport_error, but the field does by more than error_tolerance: "
         "lower transport_error."
     )
+    RELATIVE_CUTOFF = (
+        "More radiosity is left unshot than error_tolerance allows, but no more than relative_cutoff: "
+        "lower relative_cutoff."
+    )
     MINIMUM_AREA = "Every element that needs refinement has the minimum area: lower minimum_area."
 
 

@@ -43,10 +43,11 @@ def choose(
     """The worst links, until `resolve` of the squared error is dealt with; or why nothing can be done."""
     links = state.links
     errors = estimate.links
+    left_alone = 0.0
     if settings.transport_error is not None:
-        errors[:2, estimate.irradiance <= settings.transport_error] = 0.0
-        if float(errors.sum()) <= 1e-3 * resolve:
-            return SolveOutcome.TRANSPORT_ERROR
+        small = estimate.irradiance <= settings.transport_error
+        left_alone = float(errors[:2, small].sum())
+        errors[:2, small] = 0.0
     errors[SPLIT_P, ~_splittable(state, settings, links.p)] = 0.0
     errors[SPLIT_Q, ~_splittable(state, settings, links.q)] = 0.0
     errors[RESAMPLE, links.samples >= MAX_SAMPLES] = 0.0
@@ -54,7 +55,7 @@ def choose(
     worth = errors.max(axis=0)
     total = float(worth.sum())
     if total <= 1e-3 * resolve:
-        return SolveOutcome.MINIMUM_AREA
+        return SolveOutcome.TRANSPORT_ERROR if left_alone > 1e-3 * resolve else SolveOutcome.MINIMUM_AREA
     bound = threshold_for_share(worth, min(resolve, 0.9 * total))
     chosen = np.flatnonzero(worth >= bound)
     if len(links) + 3 * len(chosen) > settings.max_links:
@@ -112,4 +113,4 @@ def _splittable(state: TransportState, settings: SolverSettings, elements: IntAr
     minimum = settings.minimum_area
     if minimum is None:
         minimum = DEFAULT_MINIMUM_AREA * state.surfaces.size**2
-    return np.asarray((tree.child[elements] >= 0) | (tree.area[elements] >= 2.0 * minimum))
+    return np.asarray((tree.child[elements] >= 0) | (tree.area[elements] >= 4.0 * minimum))

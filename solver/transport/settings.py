@@ -19,10 +19,11 @@ class SolverSettings:
     """[H A.1] Largest irradiance error in W/m2 (luminance) that one link may carry; None: derived
     from `error_tolerance` and the light in the scene."""
     minimum_area: float | None = None
-    """[H A.2] Elements smaller than twice^2 this area in m2 are not subdivided; None: derived."""
+    """[H A.2] Smallest area of an element in m2: one below four times as much is not subdivided; None:
+    derived."""
     relative_cutoff: float | None = None
-    """[H A.7] The iteration stops when the unshot radiosity is at most this fraction of the radiosity;
-    None: derived."""
+    """[H A.7] The iteration stops when the unshot radiosity is at most this fraction of what is
+    reflected; None: derived."""
     max_elements: int = 400_000
     """Elements (leaves and inner nodes) after which refinement stops with a warning."""
     max_links: int = 6_000_000

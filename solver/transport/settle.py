@@ -21,6 +21,7 @@ MOST_STEPS: Final = 500
 def settle(state: TransportState, target: float) -> Iterator[float]:
     """Work until the unshot radiosity is below `target` of the radiosity, both RMS; yields its share.
 
+    Emission does not count as radiosity here: a small bright lamp would outshine all that is unshot.
     Changes the radiosity and the irradiance of `state`.
     """
     tree = state.tree
@@ -40,7 +41,8 @@ def settle(state: TransportState, target: float) -> Iterator[float]:
     energy = _inner(tree.moment, weight, unshot, unshot)
     one = area[:, None, None]
     for _ in range(MOST_STEPS):
-        scale = np.sqrt(_inner(tree.moment, one, state.radiosity, state.radiosity).sum())
+        reflected = state.radiosity - emission
+        scale = np.sqrt(_inner(tree.moment, one, reflected, reflected).sum())
         left = np.sqrt(_inner(tree.moment, one, unshot, unshot).sum())
         held = float((area[:, None] * np.abs(state.radiosity[:, 0])).sum())
         yield float((area[:, None] * np.abs(unshot[:, 0])).sum()) / max(held, 1e-300)

@@ -201,15 +201,17 @@ class RadiositySolver:
                 self.unshot_fraction = unshot
                 yield True
             estimate = estimate_error(state)
-            self.error_estimate = estimate.relative
+            self.error_estimate = max(estimate.relative, cutoff or 0.0)
             self._rounds += 1
             self.version += 1
             self._report_progress()
             yield True
-            if self.error_estimate <= tolerance:
+            if estimate.relative <= tolerance:
+                if self.error_estimate > tolerance:
+                    self.outcome = SolveOutcome.RELATIVE_CUTOFF
                 return
             total = float(estimate.links.sum())
-            excess = total * (1.0 - (0.95 * tolerance / self.error_estimate) ** 2) / 0.7
+            excess = total * (1.0 - (0.95 * tolerance / estimate.relative) ** 2) / 0.7
             choice = choose(state, estimate, self.settings, min(excess, _REFINE_SHARE * total))
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
