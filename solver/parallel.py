@@ -29,8 +29,8 @@ def run_chunks(work: Callable[[int, int], object], count: int, chunk: int, least
     """Call `work(start, stop)` over [0, count) in pieces of at most `chunk`, on all cores.
 
     A range of few chunks is cut finer, into pieces of at least `least`, where given, so that all cores
-    have some. `work` must write to disjoint outputs for disjoint ranges. The caller works too; the first
-    exception raised by a piece is raised here after all pieces have ended.
+    have some. `work` must write to disjoint outputs for disjoint ranges, and may call this function itself.
+    The caller works too; the first exception raised by a piece is raised here after all pieces have ended.
     """
     if count <= 0:
         return
@@ -53,6 +53,9 @@ def run_chunks(work: Callable[[int, int], object], count: int, chunk: int, least
     try:
         drain()
     finally:
-        errors = [error for future in futures if (error := future.exception()) is not None]
+        # Helpers that have not begun are not waited for: `work` may come from a piece itself, when all
+        # threads of the pool are taken.
+        begun = [future for future in futures if not future.cancel()]
+        errors = [error for future in begun if (error := future.exception()) is not None]
     if errors:
         raise errors[0]
