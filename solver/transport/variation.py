@@ -144,6 +144,8 @@ def form_factor_variation(
     )
     reach = _FOOTPRINT * max(distance, 0.25 * radius2)
     spot = square_mean * (area / reach - 1.0)
+    # The centre may have been in it, alone.
+    residual = min(residual, max(spot, square_mean))
     if spot > residual + linear:
         mean_u = 0.0
         mean_v = 0.0
