@@ -200,9 +200,15 @@ def add_up(
                 visible_square += w * w
                 for c in range(channels):
                     sums[c] += w * seen[ray, c]
-        if total <= 0.0:
-            continue
         bright = 0.0
+        if total <= 0.0:
+            # No sample lies above the horizon, though a part of the element does: taken as seen.
+            for c in range(channels):
+                value = max(0.0, seen[first[entry], c])
+                irradiance[point[entry], c] += factor[entry] * value
+                bright += channel_weights[c] * value
+            variance[point[entry]] += (factor[entry] * bright) ** 2
+            continue
         for c in range(channels):
             irradiance[point[entry], c] += factor[entry] * sums[c] / total
             bright += channel_weights[c] * sums[c]

@@ -18,7 +18,7 @@ from solver.transport.settings import SolverSettings
 from solver.transport.state import TransportState
 from solver.types import BoolArray, IntArray
 
-NOISE_SHARE: Final = 0.5
+NOISE_SHARE: Final = 4.0
 """Noise that fresh links may have, of the least error that is refined in the same round."""
 
 DEFAULT_MINIMUM_AREA: Final = 1e-8

@@ -41,8 +41,14 @@ _LEAST_RAYS: Final = 128
 _MOST_RAYS: Final = 8192
 """Rays of one call of `irradiance_at`, and their bounds per point."""
 
-_REFINE_SHARE: Final = 0.75
-"""A round of refinement resolves at most this share of the squared error."""
+_REFINE_SHARE: Final = 0.5
+"""A round of refinement deals with at most this share of the squared error."""
+
+_RESOLVED: Final = 0.9
+"""Share of a link's squared error that refining it takes away."""
+
+_AIM: Final = 0.97
+"""Part of the tolerance that the last round aims at."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +217,7 @@ class RadiositySolver:
                     self.outcome = SolveOutcome.RELATIVE_CUTOFF
                 return
             total = float(estimate.links.sum())
-            excess = total * (1.0 - (0.95 * tolerance / estimate.relative) ** 2) / 0.7
+            excess = total * (1.0 - (_AIM * tolerance / estimate.relative) ** 2) / _RESOLVED
             choice = choose(state, estimate, self.settings, min(excess, _REFINE_SHARE * total))
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
