@@ -28,7 +28,7 @@ def without_a_face(share: float) -> World:
         for k, face in enumerate(INWARD)
         if k != 1
     ]
-    lid = [[0, 0, 1], [0, 1, 1], [1 - share, 1, 1], [1 - share, 0, 1]]
+    lid = np.array([[0, 0, 1], [0, 1, 1], [1 - share, 1, 1], [1 - share, 0, 1]])
     return world(*faces, polygon("lid", lid, material(0.5)))
 
 

@@ -52,7 +52,7 @@ def test_children_tile_their_parent(polygon: Points) -> None:
     tree = tree_of(polygon)
     grow(tree, 3)
     normal = tree.patch_normal[0]
-    for parent in np.flatnonzero(tree.child >= 0):
+    for parent in np.flatnonzero(tree.child >= 0).tolist():
         first, count = tree.child[parent], tree.child_count[parent]
         children = range(first, first + count)
         assert sum(tree.area[c] for c in children) == pytest.approx(tree.area[parent], rel=1e-14)
