@@ -6,7 +6,8 @@ that holds the one and an element that holds the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -44,6 +45,16 @@ class LinkBatch:
     """(n,) length of each blocker list"""
     blockers: IntArray
     """all lists, one after the other: patches"""
+
+    @staticmethod
+    def joined(batches: Sequence[LinkBatch]) -> LinkBatch:
+        """Batches, at least one, as one."""
+        return LinkBatch(
+            **{
+                column.name: np.concatenate([getattr(batch, column.name) for batch in batches])
+                for column in fields(LinkBatch)
+            }
+        )
 
 
 class LinkTable:

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.types import Int64Array
 
-SLICE: Final = 0.008
+SLICE: Final = 0.012
 """Seconds that a batch should take."""
 
 _FIRST: Final = 512.0

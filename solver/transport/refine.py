@@ -104,8 +104,7 @@ def refine(
     gone = np.zeros(len(links), dtype=bool)
     gone[chosen] = True
     links.remove(gone)
-    for batch in batches:
-        links.append(batch)
+    links.append(LinkBatch.joined(batches))
 
 
 def _splittable(state: TransportState, settings: SolverSettings, elements: IntArray) -> BoolArray:

@@ -242,11 +242,13 @@ class RadiositySolver:
         for start in range(0, n, rows):
             p, q = self._linker.facing_pairs(start, min(start + rows, n))
             yield True
+            batches = []
             for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
-                batch = self._linker.link_patches(self._state.tree, p[part], q[part], light)
-                self._state.links.append(batch)
-                self._count(batch)
+                batches.append(self._linker.link_patches(self._state.tree, p[part], q[part], light))
+                self._count(batches[-1])
                 yield True
+            if batches:
+                self._state.links.append(LinkBatch.joined(batches))
 
     def _count(self, batch: LinkBatch) -> None:
         self._ray_count += 16 * int(batch.samples.sum())
