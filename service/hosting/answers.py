@@ -32,6 +32,7 @@ from solver.errors import (
     SceneError,
     SolverError,
 )
+from solver.rendering.encoding import EncodingError
 
 REFUSED: Final = (SolverError, MemoryError)
 """What an engine raises on purpose, having changed nothing."""
@@ -79,6 +80,8 @@ def refusal_of(error: SolverError | MemoryError) -> Refusal:
     match error:
         case SceneError():
             return Refusal(RefusalKind.INVALID, error.message, error.location)
+        case EncodingError():
+            return Refusal(RefusalKind.INVALID, str(error), ("format",))
         case RevisionConflictError():
             return Refusal(RefusalKind.CONFLICT, str(error))
         case LimitExceededError():

@@ -136,6 +136,13 @@ def test_layers_come_as_numbers_and_as_pictures(client: TestClient, settled: str
     assert len(np.unique(pixels)) > 1
 
 
+def test_a_format_that_cannot_hold_a_layer_is_named(client: TestClient, settled: str) -> None:
+    query = {"layer": "position", "format": "hdr", "eye": "0,0,1", "target": "-0.5,0,0", "up": "0,1,0"}
+    answer = client.get(f"{settled}/frame", params=query)
+    assert problem_of(answer, 422)
+    assert fields_at_fault(answer) == [["query", "format"]]
+
+
 def test_illuminance_is_in_lux(client: TestClient, settled: str) -> None:
     irradiance = frame(client, settled, layer="irradiance")[CORNER]
     expected = 179.0 * float(irradiance @ [0.2126, 0.7152, 0.0722])
