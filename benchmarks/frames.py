@@ -120,6 +120,7 @@ def tabulate(found: list[FrameFigures]) -> Table:
         ("scene", "way", "frames / s", "ms", "of gouraud"),
         tuple(row for figures in found for row in _rows(figures)),
         "Frames are read back as float32 radiance; jpeg: tone-mapped with automatic exposure and encoded.",
+        names=2,
     )
 
 

@@ -21,7 +21,10 @@ from solver.parallel import core_count
 from solver.types import Float32Array, FloatArray
 from solver.visibility.rays import CHUNK, RayScene
 
-TRIANGLES: Final = 20_000
+_RINGS: Final = 50
+_AROUND: Final = 20
+_ACROSS: Final = 10
+TRIANGLES: Final = 2 * _RINGS * _AROUND * _ACROSS
 LEAST_RATIO: Final = 0.75
 """Target: share of what embreex alone does in as many threads."""
 
@@ -46,16 +49,31 @@ class RayFigures:
     embreex_one_thread: float
 
 
-def random_triangles(count: int, rng: np.random.Generator) -> FloatArray:
-    """Small triangles strewn over the unit cube, (count, 3, 3)."""
-    centres = rng.random((count, 1, 3))
-    return np.asarray(centres + 0.01 * rng.standard_normal((count, 3, 3)))
+def random_rings(rng: np.random.Generator) -> FloatArray:
+    """Rings strewn over the unit cube, any way up, (TRIANGLES, 3, 3): surfaces, as scenes have them."""
+    around, across = 2.0 * np.pi * np.arange(_AROUND) / _AROUND, 2.0 * np.pi * np.arange(_ACROSS) / _ACROSS
+    out = 1.0 + 0.4 * np.cos(across)
+    ring = np.stack(
+        [
+            np.outer(np.cos(around), out),
+            np.outer(np.sin(around), out),
+            np.broadcast_to(0.4 * np.sin(across), (_AROUND, _ACROSS)),
+        ],
+        axis=-1,
+    )
+    a, b = ring, np.roll(ring, -1, axis=0)
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    triangles = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3)
+    turns = np.linalg.qr(rng.standard_normal((_RINGS, 3, 3)))[0]
+    sizes = rng.uniform(0.03, 0.1, (_RINGS, 1, 1))
+    placed = rng.random((_RINGS, 1, 3)) + sizes * (triangles @ turns)
+    return np.asarray(placed.reshape(-1, 3, 3))
 
 
 def measure_rays(count: int) -> RayFigures:
     """Shadow rays between random points of the cube: neighbours in the array have nothing in common."""
     rng = np.random.default_rng(1)
-    triangles = random_triangles(TRIANGLES, rng)
+    triangles = random_rings(rng)
     origins, targets = rng.random((2, count, 3))
     size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
     rays = RayScene(triangles, np.full(3, 0.5), size)
@@ -144,6 +162,7 @@ def tabulate(found: list[RayFigures]) -> Table:
             )
             for name, used, rate, targets in rows
         ),
-        f"{figures.rays:,} incoherent rays among {figures.triangles:,} random triangles, "
+        f"{figures.rays:,} incoherent rays among {figures.triangles:,} triangles of rings at random, "
         f"{100.0 * figures.blocked:.0f} % of them blocked; the best of {_TURNS} turns.",
+        names=2,
     )

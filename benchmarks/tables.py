@@ -47,6 +47,8 @@ class Table:
     rows: tuple[Row, ...]
     note: str = ""
     """How the figures were come by"""
+    names: int = 1
+    """Columns at the left that hold words; the others hold figures"""
 
     @property
     def targets(self) -> tuple[Target, ...]:
@@ -57,7 +59,8 @@ class Table:
         """For a terminal."""
         shown = RichTable(title=self.title, caption=self.note, title_justify="left", caption_justify="left")
         for number, column in enumerate(self._headings()):
-            shown.add_column(column, justify="left" if number in {0, len(self.columns)} else "right")
+            is_figure = self.names <= number < len(self.columns)
+            shown.add_column(column, justify="right" if is_figure else "left")
         for row in self.rows:
             styled = Text("\n").join(Text(str(t), "green" if t.met else "bold red") for t in row.targets)
             shown.add_row(*map(Text, row.cells), *([styled] if self.targets else []))
@@ -66,9 +69,9 @@ class Table:
     def markdown(self) -> str:
         """For a document."""
         headings = self._headings()
-        numbers = len(self.columns) - 1
-        rule = ["---", *["---:"] * numbers, *["---"] * (len(headings) - 1 - numbers)]
-        lines = [headings, tuple(rule)]
+        figures = len(self.columns) - self.names
+        rule = ["---"] * self.names + ["---:"] * figures + ["---"] * (len(headings) - len(self.columns))
+        lines: list[tuple[str, ...]] = [headings, tuple(rule)]
         for row in self.rows:
             told = (" · ".join(map(str, row.targets)),) if self.targets else ()
             lines.append(tuple(cell.replace("|", "\\|") for cell in (*row.cells, *told)))
