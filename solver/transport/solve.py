@@ -36,6 +36,9 @@ from solver.visibility.shafts import FULL, NONE, PARTIAL
 _FACING_AT_ONCE: Final = 1 << 18
 """Pairs of patches looked at between two yields."""
 
+_LINKING: Final = 0.2
+"""Part of the progress that linking the patches makes."""
+
 _PROBE_RAYS: Final = 1 << 20
 _LEAST_RAYS: Final = 128
 _MOST_RAYS: Final = 8192
@@ -194,6 +197,8 @@ class RadiositySolver:
 
     def _run(self) -> Iterator[bool]:
         yield from self._link_patches()
+        if self.outcome is not SolveOutcome.RUNNING:
+            return
         self._closed = is_closed(self.surfaces, self._rays)
         yield True
         tolerance = self.settings.error_tolerance
@@ -233,7 +238,8 @@ class RadiositySolver:
             self.progress = 1.0
         else:
             done = np.log(1.0 / max(self.error_estimate, tolerance)) / np.log(1.0 / min(tolerance, 0.999))
-            self.progress = max(self.progress, min(0.99, float(done)))
+            done = _LINKING + (1.0 - _LINKING) * float(done)
+            self.progress = max(self.progress, min(0.99, done))
 
     def _link_patches(self) -> Iterator[bool]:
         n = self.surfaces.patch_count
@@ -246,9 +252,15 @@ class RadiositySolver:
             for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
                 batches.append(self._linker.link_patches(self._state.tree, p[part], q[part], light))
                 self._count(batches[-1])
+                # Rows get shorter towards the end, since each pair is looked at once.
+                left = 1.0 - (start + rows * part.stop / len(p)) / n
+                self.progress = max(self.progress, _LINKING * (1.0 - max(0.0, left) ** 2))
                 yield True
             if batches:
                 self._state.links.append(LinkBatch.joined(batches))
+            if len(self._state.links) > self.settings.max_links:
+                self.outcome = SolveOutcome.LINK_LIMIT
+                return
 
     def _count(self, batch: LinkBatch) -> None:
         self._ray_count += 16 * int(batch.samples.sum())
