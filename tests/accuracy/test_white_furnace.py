@@ -39,7 +39,8 @@ def spread(tolerance: float) -> FloatArray:
     solver = solved(furnace(0.5), tolerance)
     area = state_of(solver).tree.area[state_of(solver).tree.leaves]
     off = raw_rows(solver) - 1.0
-    return np.array([abs(area @ off), np.sqrt(area.sum() * (area @ off**2))]) / area.sum()
+    mean, square = float(area @ off / area.sum()), float(area @ off**2 / area.sum())
+    return np.array([abs(mean), np.sqrt(square)])
 
 
 def test_rows_are_nearly_1_before_they_are_made_so() -> None:
