@@ -15,7 +15,7 @@ TOLERANCES: Final = (0.08, 0.04, 0.02, 0.01)
 
 def section(options: Options) -> Section:
     """The small scenes, at each tolerance."""
-    times, samples = (1, 64) if options.quick else (2, 384)
+    times, samples = (1, 64) if options.quick else (2, 256)
     jobs = (
         Job(f"{name} to {percent(tolerance, 0)}", measure_solve, (name, tolerance, times, samples))
         for name in options.scenes

@@ -120,9 +120,9 @@ def measure_solve(name: str, tolerance: float | None, times: int, samples: int) 
 
 def section(options: Options) -> Section:
     """All scenes at the default tolerance."""
-    times, samples = (2, 64) if options.quick else (5, 768)
+    times, samples = (2, 64) if options.quick else (5, 512)
     jobs = (
-        Job(name, measure_solve, (name, None, times, samples if name != "robot_cell" else samples // 6))
+        Job(name, measure_solve, (name, None, times, samples if name != "robot_cell" else samples // 4))
         for name in options.scenes
     )
     return Section("solve", tuple(jobs), tabulate)

@@ -75,9 +75,11 @@ def test_errors_stand_beside_the_time_of_the_default_tolerance(solved: solving.S
 def test_rays_are_measured() -> None:
     figures = occlusion.measure_rays(1 << 15)
     assert 0.2 < figures.blocked < 0.8
-    assert min(figures.points, figures.local, figures.embreex, figures.embreex_one_thread) > 0.0
+    assert min(way.rate for way in figures.ways) > 0.0
+    alone, one_thread = figures.ways[2:]
+    assert alone.of_embreex == one_thread.of_one_thread == 1.0
     assert_whole(occlusion.tabulate([figures]), 4, "way", "threads", "of embreex alone", "of one thread")
-    assert occlusion.tabulate([figures]).targets[0].value == figures.points / figures.embreex
+    assert occlusion.tabulate([figures]).targets[0].value == figures.ways[0].of_embreex
 
 
 def test_rings_are_what_they_say() -> None:
