@@ -87,7 +87,7 @@ def cast_shadow_ray(
     arriving = -(dx * mx + dy * my + dz * mz)
     squared = dx * dx + dy * dy + dz * dz
     p = leaving * arriving / (math.pi * squared * squared)
-    weight = p / (p + tables.density[patch])
+    weight = 1.0 / (1.0 + tables.density[patch] / p)
     shadows.origin[row, 0], shadows.origin[row, 1], shadows.origin[row, 2] = x, y, z
     shadows.target[row, 0] = tx + lift * mx
     shadows.target[row, 1] = ty + lift * my
@@ -181,7 +181,7 @@ def arrive(
             weight = 1.0
             if paths.cosine[i] >= 0.0:
                 p = paths.cosine[i] * abs(towards) / (math.pi * t * t)
-                weight = p / (p + q)
+                weight = 1.0 / (1.0 + q / p)  # p is infinite where the surfaces touch
             sums[item, 0] += red * weight * tables.emission[patch, 0]
             sums[item, 1] += green * weight * tables.emission[patch, 1]
             sums[item, 2] += blue * weight * tables.emission[patch, 2]
