@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from benchmarks.plan import Job, Options, Section
-from benchmarks.solving import SolveFigures, measure_solve
+from benchmarks.solving import PATHS, SolveFigures, measure_solve
 from benchmarks.tables import Row, Table, percent
 from solver.transport.settings import SolverSettings
 
@@ -15,9 +15,9 @@ TOLERANCES: Final = (0.08, 0.04, 0.02, 0.01)
 
 def section(options: Options) -> Section:
     """The small scenes, at each tolerance."""
-    times, samples = (1, 64) if options.quick else (2, 256)
+    times, paths = (1, PATHS // 8) if options.quick else (2, PATHS)
     jobs = (
-        Job(f"{name} to {percent(tolerance, 0)}", measure_solve, (name, tolerance, times, samples))
+        Job(f"{name} to {percent(tolerance, 0)}", measure_solve, (name, tolerance, times, paths))
         for name in options.scenes
         if name in SCENES
         for tolerance in TOLERANCES

@@ -22,6 +22,9 @@ ERROR: Final = {"cornell": 0.02, "cube_room": 0.02, "office": 0.02}
 MEMORY: Final = {"robot_cell": 1000.0}
 """Targets: seconds, relative error, MB."""
 
+PATHS: Final = 1 << 20
+"""Of the witness, for each of its two estimates"""
+
 _LONG: Final = 8.0
 """Seconds of solving one scene after which it is not solved again."""
 
@@ -91,8 +94,8 @@ def solve(scene: Scene, settings: SolverSettings, times: int) -> Solved:
     return Solved(best.solver, best.world, best.seconds, longest, runs)
 
 
-def measure_solve(name: str, tolerance: float | None, times: int, samples: int) -> SolveFigures:
-    """Solve a sample scene; `tolerance` None is the default, `samples` as in `measured_error`."""
+def measure_solve(name: str, tolerance: float | None, times: int, paths: int) -> SolveFigures:
+    """Solve a sample scene; `tolerance` None is the default, `paths` as in `measured_error`."""
     memory_of_imports = peak_memory()
     warm_up()
     settings = SolverSettings() if tolerance is None else SolverSettings(error_tolerance=tolerance)
@@ -110,7 +113,7 @@ def measure_solve(name: str, tolerance: float | None, times: int, samples: int) 
         rays=statistics.rays,
         rounds=statistics.rounds,
         estimated_error=solved.solver.error_estimate,
-        measured=measured_error(solved.world, solved.solver.field(), samples),
+        measured=measured_error(solved.world, solved.solver.field(), paths),
         converged=solved.solver.outcome is SolveOutcome.CONVERGED,
         longest_slice=solved.longest_slice,
         peak_memory=peak,
@@ -120,11 +123,8 @@ def measure_solve(name: str, tolerance: float | None, times: int, samples: int) 
 
 def section(options: Options) -> Section:
     """All scenes at the default tolerance."""
-    times, samples = (2, 64) if options.quick else (5, 512)
-    jobs = (
-        Job(name, measure_solve, (name, None, times, samples if name != "robot_cell" else samples // 4))
-        for name in options.scenes
-    )
+    times, paths = (2, PATHS // 8) if options.quick else (5, PATHS)
+    jobs = (Job(name, measure_solve, (name, None, times, paths)) for name in options.scenes)
     return Section("solve", tuple(jobs), tabulate)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,10 @@ from solver.engine.world import World
 from solver.pathtracing import PathTracer
 from solver.transport.field import RadiosityField
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
+
+_LEAST_SAMPLES: Final = 32
+_MOST_SAMPLES: Final = 8192
+"""Paths from a leaf for one estimate: one for each pass at least, and no more than a few leaves need."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,9 @@ class MeasuredError:
         return f"{100.0 * self.value:.2f} ± {100.0 * self.standard_error:.2f} %"
 
 
-def measured_error(world: World, field: RadiosityField, samples: int) -> MeasuredError:
-    """The error of `field` against twice `samples` paths from each leaf."""
+def measured_error(world: World, field: RadiosityField, paths: int) -> MeasuredError:
+    """The error of `field` against twice about `paths` paths, as many from each leaf."""
+    samples = min(_MOST_SAMPLES, max(_LEAST_SAMPLES, paths // len(field.area)))
     surfaces = world.surfaces
     reflectance = surfaces.reflectance[field.patch]
     first, second = (

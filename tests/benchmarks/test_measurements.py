@@ -36,7 +36,7 @@ def assert_whole(table: Table, rows: int, *columns: str) -> None:
 
 @pytest.fixture(scope="module")
 def solved() -> solving.SolveFigures:
-    return solving.measure_solve("cornell", 0.08, 2, 64)
+    return solving.measure_solve("cornell", 0.08, 2, 1 << 14)
 
 
 def test_a_solve_is_measured(solved: solving.SolveFigures) -> None:
