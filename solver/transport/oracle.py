@@ -35,7 +35,7 @@ SPLIT_Q: Final = 1
 RESAMPLE: Final = 2
 """What can be done about a link's error."""
 
-MAX_SAMPLES: Final = 64
+MAX_SAMPLES: Final = 256
 """Most samples a link takes, 16 rays each."""
 
 CORRELATION: Final = 0.5
@@ -214,7 +214,7 @@ def samples_needed(
     limit: float,
     out: IntArray,
 ) -> None:
-    """Samples (1, 4, 16, 64) per link (n,) that keep the error of a half-visible one below `limit`."""
+    """Samples (1, 4, 16 ... MAX_SAMPLES) per link (n,) that keep the error of a half-visible one below `limit`."""
     for link in range(len(p)):
         i = p[link]
         j = q[link]
