@@ -12,8 +12,9 @@ import typer
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from benchmarks.plan import Section
-    from benchmarks.tables import Table
+    from rich.table import Table as RichTable
+
+    from benchmarks.tables import Target
 
 _SECTIONS: Final = ("solve", "accuracy", "rays", "frames", "service")
 _QUICK_LEAVES_OUT: Final = "robot_cell"
@@ -42,8 +43,10 @@ def bench(
     machine shows in the figures.
     """
     from benchmarks import accuracy, frames, occlusion, serving, solving
+    from benchmarks.isolation import in_own_process
     from benchmarks.machine import Machine
     from benchmarks.plan import SCENES, Options
+    from halflight.console import progress_bar
 
     every = tuple(name for name in SCENES if not (quick and name == _QUICK_LEAVES_OUT))
     options = Options(_named(scenes, SCENES, "--scenes") if scenes else every, quick)
@@ -53,48 +56,40 @@ def bench(
     if file is not None and not file.parent.is_dir():
         raise typer.BadParameter(f"there is no directory {file.parent}", param_hint="--json")
     machine, start = Machine.this(), time.perf_counter()
-    found = _run(plan)
-    tables = [section.table(found[section.name]) for section in plan]
-    if file is not None:
-        record = {"machine": machine.record(), "options": asdict(options)}
-        measured = {name: [asdict(figures) for figures in several] for name, several in found.items()}
-        file.write_text(json.dumps({**record, **measured}, indent=2) + "\n", encoding="utf-8")
-    _show(str(machine), tables, time.perf_counter() - start, markdown)
-
-
-def _run(plan: list[Section]) -> dict[str, list[Any]]:
-    """What the jobs of each section return."""
-    from benchmarks.isolation import in_own_process
-    from halflight.console import progress_bar
-
     found: dict[str, list[Any]] = {}
+    targets: list[Target] = []
+    _tell(str(machine))
     with progress_bar() as bar:
         task = bar.add_task("Measuring", total=sum(len(section.jobs) for section in plan), note="")
         for section in plan:
+            measured = found[section.name] = []
             for job in section.jobs:
                 bar.update(task, note=f"{section.name}: {job.label}")
-                found.setdefault(section.name, []).append(in_own_process(job.measure, *job.arguments))
+                measured.append(in_own_process(job.measure, *job.arguments))
                 bar.advance(task)
+            # At once: what comes later may fail.
+            table = section.table(measured)
+            targets.extend(table.targets)
+            _tell(table.markdown() if markdown else table.rich())
         bar.update(task, note="")
-    return found
-
-
-def _show(machine: str, tables: list[Table], seconds: float, markdown: bool) -> None:
-    targets = [target for table in tables for target in table.targets]
+    if file is not None:
+        record = {"machine": machine.record(), "options": asdict(options)}
+        figures = {name: [asdict(one) for one in several] for name, several in found.items()}
+        file.write_text(json.dumps({**record, **figures}, indent=2) + "\n", encoding="utf-8")
     met = sum(target.met for target in targets)
-    summary = f"{met} of {len(targets)} targets met; measured in {seconds:.0f} s"
-    if markdown:
-        typer.echo("\n".join([f"{machine}\n", *(table.markdown() for table in tables), summary]))
+    _tell(f"{met} of {len(targets)} targets met; measured in {time.perf_counter() - start:.0f} s")
+
+
+def _tell(what: str | RichTable) -> None:
+    """Text as it is, or a table."""
+    if isinstance(what, str):
+        typer.echo(f"{what}\n")
         return
     console = Console()
     # A table that is cut off where the output is no terminal helps nobody.
     if not console.is_terminal:
         console = Console(width=200)
-    console.print(machine, highlight=False)
-    for table in tables:
-        console.print()
-        console.print(table.rich())
-    console.print(f"\n{summary}", highlight=False)
+    console.print(what, "")
 
 
 def _named(given: str, known: tuple[str, ...], option: str) -> tuple[str, ...]:
@@ -107,4 +102,6 @@ def _named(given: str, known: tuple[str, ...], option: str) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    typer.run(bench)
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(bench)
+    app()

@@ -122,7 +122,7 @@ def test_the_command_prints_a_table_and_writes_all_figures(tmp_path: Path) -> No
     done = bench("--only", "rays", "--quick", "--markdown", "--json", str(file))
     assert done.returncode == 0, done.stderr
     assert "### Shadow rays a second" in done.stdout
-    assert " of 1 targets met; measured in " in done.stdout.splitlines()[-1]
+    assert " of 1 targets met; measured in " in done.stdout.strip().splitlines()[-1]
     told = json.loads(file.read_text())
     assert told["machine"]["cores"] >= 1
     assert told["options"]["quick"] is True
