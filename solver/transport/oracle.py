@@ -38,7 +38,7 @@ RESAMPLE: Final = 2
 MAX_SAMPLES: Final = 256
 """Most samples a link takes, 16 rays each."""
 
-CORRELATION: Final = 0.5
+CORRELATION: Final = 1.0
 """Of the residuals of radiosity and form factor over one element."""
 
 
@@ -214,7 +214,7 @@ def samples_needed(
     limit: float,
     out: IntArray,
 ) -> None:
-    """Samples (1, 4, 16 ... MAX_SAMPLES) per link (n,) that keep the error of a half-visible one below `limit`."""
+    """Samples (1, 4 ... MAX_SAMPLES) per link (n,) that keep the error of one half visible below `limit`."""
     for link in range(len(p)):
         i = p[link]
         j = q[link]
