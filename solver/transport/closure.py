@@ -4,7 +4,7 @@ Form factors of an enclosure sum to 1 from every element; sampled visibility and
 of parts in a thousand, which reflectances near 1 would amplify a hundredfold. The sums are restored by
 symmetric scaling, G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity, and the rest and
 the gradient that a leaf would see in a uniform field by coupling it with itself. In an open scene the row
-sums are what they are; only those that would let light multiply are brought down. Whether a scene
+sums are what they are, but for patches where they are above 1 on average. Whether a scene
 is closed is asked of rays: if `PROBES` cosine-distributed rays, spread over the surfaces by area, all
 end on fronts, at most about 3 / PROBES of the light can escape unseen (95 % confidence).
 """
@@ -25,7 +25,7 @@ from solver.visibility.rays import RayScene
 PROBES: Final = 16384
 _STEPS: Final = 2
 _MOST_REFLECTED: Final = 0.995
-"""In an open scene no leaf reflects more than this share of a uniform field, whatever its links say."""
+"""Where balance is strict, no leaf reflects more than this share of a uniform field."""
 
 _LEAST_SUM: Final = 0.25
 """A row sum below this is no matter of scale."""
@@ -69,8 +69,12 @@ def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
     return bool(np.all(from_front | two_sided))
 
 
-def balance(state: TransportState, closed: bool) -> Iterator[None]:
-    """Bring the row sums to where they must be, after links have changed."""
+def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterator[None]:
+    """Bring the row sums to where they must be, after links have changed.
+
+    In an open scene: of every patch on average; `strict`: of every leaf, so that light cannot multiply
+    anywhere, at the price of what leaves with too great a sum receive rightly.
+    """
     tree = state.tree
     n = len(tree)
     leaf = tree.child < 0
@@ -79,14 +83,19 @@ def balance(state: TransportState, closed: bool) -> Iterator[None]:
     unit = np.zeros((n, 3, 1))
     unit[:, 0] = 1.0
     highest = state.reflectance.max(axis=1)[tree.patch]
-    limit = _MOST_REFLECTED / np.maximum(highest, 1e-300)
     for _ in range(_STEPS):
         row_sum = state.gather(unit)[:, 0, 0]
         yield
         if closed:
             target = np.where(leaf & (row_sum > _LEAST_SUM), 1.0, row_sum)
+        elif strict:
+            target = np.where(
+                leaf, np.minimum(row_sum, _MOST_REFLECTED / np.maximum(highest, 1e-300)), row_sum
+            )
         else:
-            target = np.where(leaf, np.minimum(row_sum, limit), row_sum)
+            total = np.bincount(tree.patch[leaf], tree.area[leaf] * row_sum[leaf], tree.patch_count)
+            of_patch = total / tree.area[: tree.patch_count]
+            target = np.where(leaf, row_sum / np.maximum(of_patch, 1.0)[tree.patch], row_sum)
         off = target != row_sum
         if not off.any():
             return

@@ -6,7 +6,7 @@ field. Links carry linear functions (`pushpull`), so that errors come from what 
 * arriving: light from q falls on p with a residual that no linear function over p shows. Subdividing p
   resolves it;
 * leaving: p sends q its mean and first moment; where its radiosity has a residual and the form factor
-  over p has one too, they may be correlated. Subdividing p resolves it;
+  over p has one too, they are taken as fully correlated. Subdividing p resolves it;
 * sampling: the visible fraction is known from rays. More rays resolve it.
 
 Errors of links that share a receiver tend to have one sign (where two surfaces come close, links from
@@ -37,9 +37,6 @@ RESAMPLE: Final = 2
 
 MAX_SAMPLES: Final = 256
 """Most samples a link takes, 16 rays each."""
-
-CORRELATION: Final = 1.0
-"""Of the residuals of radiosity and form factor over one element."""
 
 
 @kernel
@@ -125,8 +122,8 @@ def leaving_bias(
     for link in range(len(p)):
         i = p[link]
         j = q[link]
-        bias[j] += CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
-        bias[i] += CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
+        bias[j] += reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
+        bias[i] += reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
     for e in range(len(bias)):
         if parent[e] >= 0:
             bias[e] += bias[parent[e]]
@@ -180,10 +177,10 @@ def link_errors(
                 radiosity[j],
             )
         arriving = reflectance[i] * radiosity[j] * residual_p[link] * amplitude[i]
-        leaving = CORRELATION * reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j]) * bias[j]
+        leaving = reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j]) * bias[j]
         error_p[link] = area[i] * resolved[i] * arriving + area[j] * leaving
         arriving = reflectance[j] * radiosity[i] * residual_q[link] * amplitude[j]
-        leaving = CORRELATION * reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
+        leaving = reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
         error_q[link] = area[j] * resolved[j] * arriving + area[i] * leaving
 
 

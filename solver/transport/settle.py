@@ -7,7 +7,7 @@ unshot radiosity itself: the search directions are combinations of shots, and Ja
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Final
 
 import numpy as np
@@ -18,11 +18,12 @@ from solver.types import FloatArray
 MOST_STEPS: Final = 500
 
 
-def settle(state: TransportState, target: float) -> Iterator[float]:
+def settle(state: TransportState, target: float) -> Generator[float, None, bool]:
     """Work until the unshot radiosity is below `target` of the radiosity, both RMS; yields its share.
 
     Emission does not count as radiosity here: a small bright lamp would outshine all that is unshot.
-    Changes the radiosity and the irradiance of `state`.
+    Changes the radiosity and the irradiance of `state`. Returns whether the target was met; it is not where
+    links in error let light multiply.
     """
     tree = state.tree
     leaf = tree.child < 0
@@ -47,16 +48,19 @@ def settle(state: TransportState, target: float) -> Iterator[float]:
         held = float((area[:, None] * np.abs(state.radiosity[:, 0])).sum())
         yield float((area[:, None] * np.abs(unshot[:, 0])).sum()) / max(held, 1e-300)
         if left <= target * scale:
-            return
+            return True
         arrived = state.gather(direction)
         moved = np.where(active, direction - reflectance * arrived, 0.0)
         curvature = _inner(tree.moment, weight, direction, moved)
+        if np.any((curvature <= 0.0) & (energy > 0.0)):
+            return False
         length = _ratio(energy, curvature)
         state.radiosity += length * direction
         state.received += length * arrived
         unshot -= length * moved
         before, energy = energy, _inner(tree.moment, weight, unshot, unshot)
         direction = unshot + _ratio(energy, before) * direction
+    return False
 
 
 def _inner(moment: FloatArray, weight: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:

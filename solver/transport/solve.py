@@ -10,7 +10,7 @@ Work is a generator that yields about every few milliseconds, so that `step` can
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -204,13 +204,11 @@ class RadiositySolver:
         tolerance = self.settings.error_tolerance
         state = self._state
         while True:
-            for _ in balance(state, self._closed):
-                yield True
             cutoff = self.settings.relative_cutoff
             target = 0.05 * min(tolerance, self.error_estimate) if cutoff is None else cutoff
-            for unshot in settle(state, target):
-                self.unshot_fraction = unshot
-                yield True
+            if not (yield from self._settle(target)):
+                state.radiosity[:, 1:] = 0.0
+                yield from self._settle(target, strict=True)
             estimate = estimate_error(state)
             self.error_estimate = max(estimate.relative, cutoff or 0.0)
             self._rounds += 1
@@ -231,6 +229,17 @@ class RadiositySolver:
             for batch in refine(state, self._linker, self._pace, estimate.light, choice):
                 self._count(batch)
                 yield True
+
+    def _settle(self, target: float, strict: bool = False) -> Generator[bool, None, bool]:
+        for _ in balance(self._state, self._closed, strict):
+            yield True
+        work = settle(self._state, target)
+        while True:
+            try:
+                self.unshot_fraction = next(work)
+            except StopIteration as end:
+                return bool(end.value)
+            yield True
 
     def _report_progress(self) -> None:
         tolerance = self.settings.error_tolerance

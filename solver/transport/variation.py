@@ -23,6 +23,8 @@ _GAUSS: Final = 0.5 - 0.5 / math.sqrt(3.0)
 _FOOTPRINT: Final = 3.0 * math.pi
 _CURVATURE: Final = 0.8
 """Mean square of a s^2 + b t^2 from its mean, over the squared difference of Gauss points and centre."""
+_QUADRATURE: Final = 0.1
+"""The points' mean may differ from the exact one by this much of it without there being a step."""
 _LEAST: Final = 0.25
 """The quadratic part is taken to be at least this times the square of the linear part over the mean."""
 
@@ -138,6 +140,10 @@ def form_factor_variation(
         twist = 0.25 * (value0 - value1 + value2 - value3) * scale if count == 4 else 0.0
         bend = 1.0 - middle * scale
         residual = square_mean * (twist * twist + _CURVATURE * bend * bend)
+        # An edge of the light that the points do not show moves the mean, and leaves a step behind.
+        missed = abs(total / count - mean) - _QUADRATURE * mean
+        if missed > 0.0:
+            residual = max(residual, missed * max(mean, total / count))
     # The spot that the points may have missed.
     distance = _square_distance(
         source_centroid[0], source_centroid[1], source_centroid[2], receiver, count, normal, scratch[0]
