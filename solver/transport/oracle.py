@@ -225,20 +225,27 @@ def samples_needed(
 
 
 @kernel
-def _histogram(errors: FloatArray, sums: FloatArray) -> None:
+def _histogram(errors: FloatArray, greatest: float, sums: FloatArray) -> None:
+    """Sums of the errors by quarter octaves, the first of them around the greatest.
+
+    Symmetric scenes have many equal errors, which rounding must not part.
+    """
     for value in errors:
         if value > 0.0:
-            slot = math.floor(4.0 * math.log2(value)) + len(sums) // 2
+            slot = math.floor(0.5 - 4.0 * math.log2(value / greatest))
             sums[min(max(slot, 0), len(sums) - 1)] += value
 
 
 def threshold_for_share(errors: FloatArray, resolved: float) -> float:
-    """The value above which `errors` (n,) sum up to at least `resolved`, to within a quarter octave."""
-    sums = np.zeros(4096)
-    _histogram(errors, sums)
-    from_top = np.cumsum(sums[::-1])
-    slot = len(sums) - 1 - int(np.searchsorted(from_top, resolved))
-    return float(2.0 ** ((max(slot, 0) - len(sums) // 2) / 4.0))
+    """The value above which `errors` (n,) sum up to at least `resolved`, to within a quarter octave.
+
+    It is below the greatest error, which must be positive.
+    """
+    greatest = float(errors.max())
+    sums = np.zeros(1024)
+    _histogram(errors, greatest, sums)
+    slot = int(np.searchsorted(np.cumsum(sums), resolved))
+    return greatest * float(2.0 ** (-(min(slot, len(sums) - 1) + 0.5) / 4.0))
 
 
 @kernel

@@ -68,10 +68,8 @@ def choose(
     return Choice(chosen.astype(np.int32), action, bound)
 
 
-def refine(
-    state: TransportState, linker: Linker, pace: Pace, light: Light, choice: Choice
-) -> Iterator[LinkBatch]:
-    """Replace the chosen links by better ones; yields the batches as they are made."""
+def refine(state: TransportState, linker: Linker, pace: Pace, light: Light, choice: Choice) -> Iterator[int]:
+    """Replace the chosen links by better ones; yields the rays that each slice of it took, / 16."""
     tree, links = state.tree, state.links
     chosen, action = choice.links, choice.action
     p, q, samples = links.p[chosen], links.q[chosen], links.samples[chosen]
@@ -100,10 +98,11 @@ def refine(
             tree, new_p[part], new_q[part], start[source], count[source], pool, least[source], light
         )
         batches.append(batch)
-        yield batch
+        yield int(batch.samples.sum())
     gone = np.zeros(len(links), dtype=bool)
     gone[chosen] = True
     links.remove(gone)
+    yield 0
     links.append(LinkBatch.joined(batches))
 
 

@@ -30,6 +30,7 @@ from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
 from solver.types import FloatArray, Points, Spectra
+from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import FULL, NONE, PARTIAL
 
@@ -226,8 +227,8 @@ class RadiositySolver:
                 self.outcome = choice
                 return
             yield True
-            for batch in refine(state, self._linker, self._pace, estimate.light, choice):
-                self._count(batch)
+            for samples in refine(state, self._linker, self._pace, estimate.light, choice):
+                self._ray_count += STRATA * samples
                 yield True
 
     def _settle(self, target: float, strict: bool = False) -> Generator[bool, None, bool]:
@@ -260,7 +261,7 @@ class RadiositySolver:
             batches = []
             for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
                 batches.append(self._linker.link_patches(self._state.tree, p[part], q[part], light))
-                self._count(batches[-1])
+                self._ray_count += STRATA * int(batches[-1].samples.sum())
                 # Rows get shorter towards the end, since each pair is looked at once.
                 left = 1.0 - (start + rows * part.stop / len(p)) / n
                 self.progress = max(self.progress, _LINKING * (1.0 - max(0.0, left) ** 2))
@@ -270,9 +271,6 @@ class RadiositySolver:
             if len(self._state.links) > self.settings.max_links:
                 self.outcome = SolveOutcome.LINK_LIMIT
                 return
-
-    def _count(self, batch: LinkBatch) -> None:
-        self._ray_count += 16 * int(batch.samples.sum())
 
 
 def _patch_keys(surfaces: Surfaces) -> list[tuple[str, int, int, int]]:

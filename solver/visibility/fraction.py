@@ -18,7 +18,7 @@ from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray
 from solver.visibility.pair_rays import STRATA, generate_rays
 from solver.visibility.rays import RayScene
 
-STRATIFIED: Final = 0.5
+STRATIFIED: Final = 0.75
 """Variance of a stratified sample relative to that of a random one."""
 
 MISSED: Final = 0.2
