@@ -32,22 +32,26 @@ class GrowingArray(Generic[T]):
 
     def grow(self, count: int) -> NDArray[T]:
         """Append `count` rows of zeros and return a view of them."""
-        needed = self._size + count
-        if needed > len(self._data):
-            grown = np.zeros((max(needed, 2 * len(self._data)), *self._data.shape[1:]), self._data.dtype)
-            grown[: self._size] = self._data[: self._size]
-            self._data = grown
-        fresh = self._data[self._size : needed]
+        fresh = self._extend(count)
         fresh[...] = 0
-        self._size = needed
         return fresh
 
     def append(self, rows: NDArray[Any]) -> None:
         """Append rows."""
-        self.grow(len(rows))[...] = rows
+        self._extend(len(rows))[...] = rows
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Drop the rows where `mask` is false."""
         kept = self._data[: self._size][mask]
         self._data[: len(kept)] = kept
         self._size = len(kept)
+
+    def _extend(self, count: int) -> NDArray[T]:
+        needed = self._size + count
+        if needed > len(self._data):
+            grown = np.empty((max(needed, 2 * len(self._data)), *self._data.shape[1:]), self._data.dtype)
+            grown[: self._size] = self._data[: self._size]
+            self._data = grown
+        fresh = self._data[self._size : needed]
+        self._size = needed
+        return fresh

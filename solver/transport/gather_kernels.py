@@ -11,7 +11,7 @@ from solver.kernels import kernel
 from solver.transport.lambert import point_form_factor
 from solver.types import BoolArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.fraction import MISSED, STRATIFIED
-from solver.visibility.sampling import hash_index, sample_by_solid_angle, sample_element
+from solver.visibility.sampling import fraction_of, hash_index, sample_by_solid_angle, sample_element
 
 LEVEL: Final = 1e-3
 """An element is entered while its radiosity residual brings more than this share of the irradiance."""
@@ -129,8 +129,8 @@ def generate_rays(
         shift_u = (h & 0xFFFFF) / 1048576.0
         shift_v = ((h >> 20) & 0xFFFFF) / 1048576.0
         for s in range(samples[entry]):
-            u = (shift_u + (s + 1) / _ROOT) % 1.0
-            v = (shift_v + (s + 1) / (_ROOT * _ROOT)) % 1.0
+            u = fraction_of(shift_u + (s + 1) / _ROOT)
+            v = fraction_of(shift_v + (s + 1) / (_ROOT * _ROOT))
             if near:
                 weight = sample_by_solid_angle(corners[e], counts[e], n2, x, u, v, work, y)
             else:

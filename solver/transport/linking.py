@@ -19,10 +19,11 @@ from solver.transport.links import LinkBatch, ragged_indices
 from solver.transport.oracle import samples_needed
 from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
 from solver.types import FloatArray, Int64Array, IntArray
+from solver.visibility.blockers import first_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
-from solver.visibility.shafts import NONE, PARTIAL, first_blockers
+from solver.visibility.shafts import NONE, PARTIAL, bounding_spheres
 
 _CHUNK: Final = 256
 _LEAST: Final = 32
@@ -47,6 +48,8 @@ class Linker:
     surfaces: Surfaces
     rays: RayScene
     hierarchy: Hierarchy
+    spheres: FloatArray
+    """(p, 4) around the patches"""
     side_tolerance: float
     """metres"""
     exchange_tolerance: float
@@ -60,6 +63,7 @@ class Linker:
             surfaces,
             rays,
             build_hierarchy(surfaces.corners, fronts),
+            bounding_spheres(surfaces.corners),
             tolerances.SIDE * surfaces.size,
             exchange_tolerance,
         )
@@ -99,8 +103,8 @@ class Linker:
             while at < stop:
                 pool = np.empty(room, dtype=np.int32)
                 used = first_blockers(
-                    p, q, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip, h.first, h.count,
-                    h.order, self.side_tolerance, at, stop, kind, kept, pool,
+                    p, q, s.corners, s.corner_count, s.normal, self.spheres, h.low, h.high, h.skip, h.first,
+                    h.count, h.order, self.side_tolerance, at, stop, kind, kept, pool,
                 )  # fmt: skip
                 done = stop - at if used >= 0 else -1 - used
                 length = int(kept[at : at + done].sum())
@@ -133,8 +137,8 @@ class Linker:
         def work(start: int, stop: int) -> None:
             inherit_blockers(
                 p, q, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count, s.normal,
-                parent_start, parent_count, parent_pool, self.side_tolerance, start, stop, room, loose, kind,
-                kept,
+                self.spheres, parent_start, parent_count, parent_pool, self.side_tolerance, start, stop,
+                room, loose, kind, kept,
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)

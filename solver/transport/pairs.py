@@ -8,7 +8,8 @@ from solver.kernels import kernel
 from solver.transport.exchange import exchange_area, heights
 from solver.transport.variation import form_factor_variation, solve_moment
 from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
-from solver.visibility.shafts import FULL, MAX_PLANES, NONE, inherited_blockers
+from solver.visibility.blockers import inherited_blockers
+from solver.visibility.shafts import FULL, MAX_PLANES, NONE
 
 
 @kernel
@@ -53,6 +54,7 @@ def inherit_blockers(
     patch_corners: Corners,
     patch_counts: IntArray,
     normals: FloatArray,
+    spheres: FloatArray,
     parent_start: Int64Array,
     parent_count: IntArray,
     parent_pool: IntArray,
@@ -75,8 +77,8 @@ def inherit_blockers(
         j = q[pair]
         kind[pair], kept[pair] = inherited_blockers(
             corners[i], counts[i], normals[patch[i]], corners[j], counts[j], normals[patch[j]],
-            patch_corners, patch_counts, normals, parent_pool, parent_start[pair], parent_count[pair],
-            tolerance, planes, out, room[pair],
+            patch_corners, patch_counts, normals, spheres, parent_pool, parent_start[pair],
+            parent_count[pair], tolerance, planes, out, room[pair],
         )  # fmt: skip
 
 

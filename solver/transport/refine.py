@@ -104,6 +104,7 @@ def refine(state: TransportState, linker: Linker, pace: Pace, light: Light, choi
     links.remove(gone)
     yield 0
     links.append(LinkBatch.joined(batches))
+    yield 0
 
 
 def _splittable(state: TransportState, settings: SolverSettings, elements: IntArray) -> BoolArray:

@@ -37,6 +37,9 @@ from solver.visibility.shafts import FULL, NONE, PARTIAL
 _FACING_AT_ONCE: Final = 1 << 18
 """Pairs of patches looked at between two yields."""
 
+_UNSHOT: Final = 0.02
+"""Light is settled until this part of the error is unshot."""
+
 _LINKING: Final = 0.2
 """Part of the progress that linking the patches makes."""
 
@@ -206,7 +209,10 @@ class RadiositySolver:
         state = self._state
         while True:
             cutoff = self.settings.relative_cutoff
-            target = 0.05 * min(tolerance, self.error_estimate) if cutoff is None else cutoff
+            if cutoff is None:
+                target = _UNSHOT * max(tolerance, self.error_estimate)
+            else:
+                target = cutoff
             if not (yield from self._settle(target)):
                 state.radiosity[:, 1:] = 0.0
                 yield from self._settle(target, strict=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.kernels import kernel
 from solver.types import ByteArray, Corners, Float32Array, FloatArray, IntArray, Points
-from solver.visibility.sampling import hash_index, sample_by_solid_angle, sample_element
+from solver.visibility.sampling import fraction_of, hash_index, sample_by_solid_angle, sample_element
 
 STRATA: Final = 16
 """Quadrant pairs of a link."""
@@ -110,10 +110,10 @@ def generate_rays(
         for s in range(STRATA * samples):
             stratum = s % STRATA
             index = stratum * samples + s // STRATA + 1
-            u1 = 0.5 * ((stratum & 1) + (shift[0] + index * _STEP[0]) % 1.0)
-            v1 = 0.5 * (((stratum >> 1) & 1) + (shift[1] + index * _STEP[1]) % 1.0)
-            u2 = 0.5 * (((stratum >> 2) & 1) + (shift[2] + index * _STEP[2]) % 1.0)
-            v2 = 0.5 * (((stratum >> 3) & 1) + (shift[3] + index * _STEP[3]) % 1.0)
+            u1 = 0.5 * ((stratum & 1) + fraction_of(shift[0] + index * _STEP[0]))
+            v1 = 0.5 * (((stratum >> 1) & 1) + fraction_of(shift[1] + index * _STEP[1]))
+            u2 = 0.5 * (((stratum >> 2) & 1) + fraction_of(shift[2] + index * _STEP[2]))
+            v2 = 0.5 * (((stratum >> 3) & 1) + fraction_of(shift[3] + index * _STEP[3]))
             weight = sample_element(corners[i], counts[i], n1, area[i], u1, v1, x)
             if close:
                 weight *= sample_by_solid_angle(corners[j], counts[j], n2, x, u2, v2, work, y)

@@ -17,6 +17,12 @@ from solver.types import FloatArray
 
 
 @kernel
+def fraction_of(x: float) -> float:
+    """x less the integer below it; far sooner done than x % 1."""
+    return x - math.floor(x)
+
+
+@kernel
 def hash_index(x: np.int64) -> np.int64:
     """63 bits that look random, from a number of a pair of elements."""
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x7F4A7C15)

@@ -15,8 +15,7 @@ import numpy as np
 
 from solver import tolerances
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray, IntArray
-from solver.visibility.bvh import walk_hierarchy
+from solver.types import Corners, FloatArray
 
 MAX_PLANES: Final = 20
 """Two polygon planes, and at most one supporting plane on either side of each of eight edges."""
@@ -105,11 +104,19 @@ def shaft_planes(
     return count
 
 
+def bounding_spheres(corners: Corners) -> FloatArray:
+    """Centres and radii (p, 4) of spheres around polygons (p, 4, 3)."""
+    center = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
+    return np.concatenate([center, radius[:, None]], axis=1)
+
+
 @kernel
 def can_block(
     blocker: FloatArray,
     n: int,
     normal: FloatArray,
+    sphere: FloatArray,
     first: FloatArray,
     n1: int,
     second: FloatArray,
@@ -118,8 +125,16 @@ def can_block(
     plane_count: int,
     tolerance: float,
 ) -> bool:
-    """Whether a convex polygon (4, 3) reaches into the shaft and has the elements on both its sides."""
+    """Whether a convex polygon (4, 3) reaches into the shaft and has the elements on both its sides.
+
+    Its sphere (4,) settles most planes.
+    """
     for p in range(plane_count):
+        height = planes[p, 0] * sphere[0] + planes[p, 1] * sphere[1] + planes[p, 2] * sphere[2] - planes[p, 3]
+        if height + sphere[3] <= tolerance:
+            return False
+        if height - sphere[3] > tolerance:
+            continue
         outside = True
         for k in range(n):
             height = (
@@ -189,107 +204,3 @@ def covers(
                 if side < 0.0:
                     return False
     return True
-
-
-@kernel
-def first_blockers(
-    pair_p: IntArray,
-    pair_q: IntArray,
-    corners: Corners,
-    counts: IntArray,
-    normals: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    skip: IntArray,
-    leaf_first: IntArray,
-    leaf_count: IntArray,
-    order: IntArray,
-    tolerance: float,
-    start: int,
-    stop: int,
-    visibility: IntArray,
-    blocker_count: IntArray,
-    pool: IntArray,
-) -> int:
-    """Blockers of top-level pairs [start, stop) of patches, appended to `pool`; returns the pool's use.
-
-    Writes visibility (FULL, PARTIAL, NONE) and blocker_count per pair. If the pool is too small the
-    return value is -1 - (pairs done): call again from there with a fresh pool.
-    """
-    planes = np.empty((MAX_PLANES, 4))
-    candidates = np.empty(len(order), dtype=np.int32)
-    used = 0
-    for pair in range(start, stop):
-        p = pair_p[pair]
-        q = pair_q[pair]
-        plane_count = shaft_planes(
-            corners[p], counts[p], normals[p], corners[q], counts[q], normals[q], planes
-        )
-        found = walk_hierarchy(
-            low, high, skip, leaf_first, leaf_count, order, planes, plane_count, tolerance, candidates
-        )
-        if used + found > len(pool):
-            return -1 - (pair - start)
-        kept = 0
-        hidden = False
-        for k in range(found):
-            b = candidates[k]
-            if b in (p, q):
-                continue
-            if not can_block(
-                corners[b], counts[b], normals[b], corners[p], counts[p], corners[q], counts[q],
-                planes, plane_count, tolerance,
-            ):  # fmt: skip
-                continue
-            pool[used + kept] = b
-            kept += 1
-            if not hidden and covers(
-                corners[b], counts[b], normals[b], corners[p], counts[p], corners[q], counts[q], tolerance
-            ):
-                hidden = True
-                pool[used] = b
-                kept = 1
-                break
-        visibility[pair] = NONE if hidden else (FULL if kept == 0 else PARTIAL)
-        blocker_count[pair] = kept
-        used += kept
-    return used
-
-
-@kernel
-def inherited_blockers(
-    first: FloatArray,
-    n1: int,
-    normal1: FloatArray,
-    second: FloatArray,
-    n2: int,
-    normal2: FloatArray,
-    corners: Corners,
-    counts: IntArray,
-    normals: FloatArray,
-    parents: IntArray,
-    parent_start: int,
-    parent_count: int,
-    tolerance: float,
-    planes: FloatArray,
-    out: IntArray,
-    used: int,
-) -> tuple[int, int]:
-    """Which of the parent link's blockers still block a child pair: (visibility, number kept).
-
-    The kept ones are written to out[used:]; corners, counts, normals are those of the patches.
-    """
-    plane_count = shaft_planes(first, n1, normal1, second, n2, normal2, planes)
-    kept = 0
-    for k in range(parent_start, parent_start + parent_count):
-        b = parents[k]
-        if not can_block(
-            corners[b], counts[b], normals[b], first, n1, second, n2, planes, plane_count, tolerance
-        ):
-            continue
-        if covers(corners[b], counts[b], normals[b], first, n1, second, n2, tolerance):
-            out[used] = b
-            return NONE, 1
-        out[used + kept] = b
-        kept += 1
-    return (FULL if kept == 0 else PARTIAL), kept

@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 
 from solver import tolerances
 from solver.types import FloatArray, IntArray, Points
+from solver.visibility.blockers import first_blockers, inherited_blockers
 from solver.visibility.brute_force import blocks, visible_fraction
 from solver.visibility.bvh import build_hierarchy
 from solver.visibility.shafts import (
@@ -19,8 +20,7 @@ from solver.visibility.shafts import (
     MAX_PLANES,
     NONE,
     PARTIAL,
-    first_blockers,
-    inherited_blockers,
+    bounding_spheres,
     shaft_planes,
 )
 from tests.visibility.soups import Soup, polygons, soup_of, soups
@@ -66,8 +66,9 @@ def classify(soup: Soup, pool_size: int | None = None) -> Classified:
     while at < len(p):
         pool = np.empty(pool_size or len(p) * s.patch_count, dtype=np.int32)
         used = first_blockers(
-            p, q, s.corners, s.corner_count, s.normal, tree.low, tree.high, tree.skip, tree.first, tree.count,
-            tree.order, side_tolerance(soup), at, len(p), kind, count, pool,
+            p, q, s.corners, s.corner_count, s.normal, bounding_spheres(s.corners), tree.low, tree.high,
+            tree.skip, tree.first, tree.count, tree.order, side_tolerance(soup), at, len(p), kind, count,
+            pool,
         )  # fmt: skip
         done = len(p) - at if used >= 0 else -1 - used
         assert done > 0
@@ -137,8 +138,8 @@ def test_inherited_classes_and_blockers(soup: Soup, seed: int) -> None:
         out, planes = np.empty(len(parents), dtype=np.int32), np.empty((MAX_PLANES, 4))
         part_kind, kept = inherited_blockers(
             _padded(first), len(first), s.normal[p], _padded(second), len(second), s.normal[q],
-            s.corners, s.corner_count, s.normal, parents, 0, len(parents), side_tolerance(soup), planes,
-            out, 0,
+            s.corners, s.corner_count, s.normal, bounding_spheres(s.corners), parents, 0, len(parents),
+            side_tolerance(soup), planes, out, 0,
         )  # fmt: skip
         remaining = set(out[:kept].tolist())
         assert remaining <= blockers
