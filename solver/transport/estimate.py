@@ -27,7 +27,7 @@ LEAF: Final = 0.2
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
 
 
-SAFETY: Final = 1.22
+SAFETY: Final = 1.25
 """Factor on the estimate: errors that it does not know, such as of visibility that all rays agree on."""
 
 

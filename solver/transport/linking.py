@@ -15,7 +15,7 @@ from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
-from solver.transport.links import LinkBatch, ragged_indices
+from solver.transport.links import LinkBatch, take_ranges
 from solver.transport.oracle import samples_needed
 from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
 from solver.types import FloatArray, Int64Array, IntArray
@@ -142,7 +142,7 @@ class Linker:
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)
-        return self._evaluate(tree, p, q, kind, kept, loose[ragged_indices(room, kept)], least_samples, light)
+        return self._evaluate(tree, p, q, kind, kept, take_ranges(loose, room, kept), least_samples, light)
 
     def _evaluate(
         self,
@@ -211,5 +211,5 @@ class Linker:
             residual_p=residual[0, alive],
             residual_q=residual[1, alive],
             blocker_count=kept[alive],
-            blockers=pool[ragged_indices((ends - kept)[alive], kept[alive])],
+            blockers=take_ranges(pool, (ends - kept)[alive], kept[alive]),
         )

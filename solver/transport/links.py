@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from solver.arrays import GrowingArray
+from solver.kernels import kernel
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 
 
@@ -184,8 +185,7 @@ class LinkTable:
             column.keep(keep)
         used = int(self.blocker_count.sum())
         if len(self._pool) > 2 * used + 4096:
-            index = ragged_indices(self.blocker_start, self.blocker_count)
-            compact = self.pool[index]
+            compact = take_ranges(self.pool, self.blocker_start, self.blocker_count)
             self._pool = GrowingArray((), np.int32, max(4096, used))
             self._pool.append(compact)
             self.blocker_start[...] = np.cumsum(self.blocker_count, dtype=np.int64) - self.blocker_count
@@ -208,8 +208,16 @@ class LinkTable:
         )
 
 
-def ragged_indices(start: Int64Array, count: IntArray) -> Int64Array:
-    """Concatenation of the ranges [start, start + count), (sum(count),)."""
-    total = int(count.sum())
-    ends = np.cumsum(count, dtype=np.int64)
-    return np.asarray(np.arange(total, dtype=np.int64) + np.repeat(start - (ends - count), count))
+@kernel
+def take_ranges(values: IntArray, start: Int64Array, count: IntArray) -> IntArray:
+    """The values of the ranges [start, start + count), one after the other, (sum(count),)."""
+    total = 0
+    for k in range(len(start)):
+        total += count[k]
+    out = np.empty(total, dtype=np.int32)
+    at = 0
+    for k in range(len(start)):
+        for i in range(start[k], start[k] + count[k]):
+            out[at] = values[i]
+            at += 1
+    return out

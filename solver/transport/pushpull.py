@@ -15,12 +15,20 @@ Functions on elements are arrays (n, 3, channels): mean, and the gradient by the
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from solver.kernels import kernel
+from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.types import FloatArray, IntArray, Spectra
+
+_MANY: Final = 1 << 16
+_PARTS: Final = 2
+"""Of so many links each part has an array of its own to gather into; the number is fixed, so that sums are
+the same on any machine."""
 
 
 @kernel
@@ -77,14 +85,16 @@ def gather(
     slope_q: FloatArray,
     area: FloatArray,
     moments: FloatArray,
+    start: int,
+    stop: int,
     received: FloatArray,
 ) -> None:
-    """Add to the irradiance functions `received` what every link brings to both its ends.
+    """Add to the irradiance functions `received` what links [start, stop) bring to both their ends.
 
     Per link: exchange (n,) m2 and slopes (n, 2) in m2 per metre, visibility included.
     """
     channels = moments.shape[2]
-    for link in range(len(p)):
+    for link in range(start, stop):
         i = p[link]
         j = q[link]
         g = exchange[link]
@@ -117,16 +127,27 @@ def irradiance(
     sent = radiosity * closure[:, None, None]
     moments = np.empty_like(sent)
     pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, sent, moments)
-    received = np.zeros_like(sent)
-    gather(links.p, links.q, links.exchange, links.slope_p, links.slope_q, tree.area, moments, received)
-    push(tree.parent, tree.offset, received)
-    received *= closure[:, None, None]
+    parts = _PARTS if len(links) >= _MANY else 1
+    received = np.zeros((parts, *sent.shape))
+    exchange = links.exchange
+
+    def work(start: int, stop: int) -> None:
+        for part in range(start, stop):
+            gather(
+                links.p, links.q, exchange, links.slope_p, links.slope_q, tree.area, moments,
+                len(links) * part // parts, len(links) * (part + 1) // parts, received[part],
+            )  # fmt: skip
+
+    run_chunks(work, parts, 1)
+    total: FloatArray = received[0] if parts == 1 else received.sum(axis=0)
+    push(tree.parent, tree.offset, total)
+    total *= closure[:, None, None]
     if remainder.any():
         # The closure's scale is already in the moments of leaves, and divided out again.
         own = moments / closure[:, None, None]
-        received[:, 0] += np.einsum("nk,nkc->nc", remainder, own)
-        received[:, 1:] += remainder[:, 1:, None] * own[:, :1]
-    return received
+        total[:, 0] += np.einsum("nk,nkc->nc", remainder, own)
+        total[:, 1:] += remainder[:, 1:, None] * own[:, :1]
+    return total
 
 
 def means(tree: ElementTree, functions: FloatArray) -> Spectra:

@@ -37,7 +37,7 @@ from solver.visibility.shafts import FULL, NONE, PARTIAL
 _FACING_AT_ONCE: Final = 1 << 18
 """Pairs of patches looked at between two yields."""
 
-_UNSHOT: Final = 0.02
+_UNSHOT: Final = 0.03
 """Light is settled until this part of the error is unshot."""
 
 _LINKING: Final = 0.2

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.transport.links import LinkBatch, LinkTable, ragged_indices
+from solver.transport.links import LinkBatch, LinkTable, take_ranges
 from solver.types import IntArray
 from solver.visibility.shafts import FULL, NONE, PARTIAL
 from tests.transport.solving import shelf, solved, state_of
@@ -83,11 +83,12 @@ def test_stale_blockers_do_not_pile_up() -> None:
     assert table.nbytes < 4e6
 
 
-def test_ragged_indices() -> None:
+def test_take_ranges() -> None:
     start = np.array([5, 0, 7, 2], dtype=np.int64)
     count: IntArray = np.array([2, 0, 3, 1], dtype=np.int32)
-    assert ragged_indices(start, count).tolist() == [5, 6, 7, 8, 9, 2]
-    assert len(ragged_indices(start[:0], count[:0])) == 0
+    values = np.arange(10, 30, dtype=np.int32)
+    assert take_ranges(values, start, count).tolist() == [15, 16, 17, 18, 19, 12]
+    assert len(take_ranges(values, start[:0], count[:0])) == 0
 
 
 def test_every_pair_of_leaves_has_one_link() -> None:

@@ -124,7 +124,7 @@ def test_one_link_is_the_kernel_that_it_says() -> None:
     moments = function.copy()
     moments[:, 1:] *= sides**2 / 12.0
     received = np.zeros((2, 3, 1))
-    gather(p, q, exchange, *slope, area, moments[:, :, None], received)
+    gather(p, q, exchange, *slope, area, moments[:, :, None], 0, len(p), received)
     middle = (np.arange(60) + 0.5) / 60 - 0.5
     x = np.stack(np.meshgrid(middle * 2.0, middle), axis=-1).reshape(-1, 2)
     y = np.stack(np.meshgrid(middle, middle * 3.0), axis=-1).reshape(-1, 2)
