@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.geometry.faces import split_faces
 from solver.geometry.scene import Scene, SceneObject
-from solver.types import Corners, FloatArray, Int64Array, IntArray, ObjectId, Points, Vector
+from solver.types import Corners, FloatArray, Int64Array, IntArray, ObjectId, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +202,3 @@ def _join(parts: list[FloatArray], empty: tuple[int, ...]) -> FloatArray:
 
 def _join_ids(parts: list[IntArray]) -> IntArray:
     return np.concatenate(parts).astype(np.int32) if parts else np.empty(0, dtype=np.int32)
-
-
-def points_of(vertices: Sequence[Sequence[float]]) -> Points:
-    """(n, 3) array of a JSON list of points."""
-    return np.array(vertices, dtype=np.float64).reshape(-1, 3)

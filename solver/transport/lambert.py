@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import FloatArray, IntArray, Points
+from solver.types import FloatArray, Points
 
 
 @kernel
@@ -118,23 +118,3 @@ def points_to_polygon(points: Points, normals: FloatArray, polygon: Points) -> F
     out = np.empty(len(points))
     _points_to_polygon(points, normals, polygon, len(polygon), out)
     return out
-
-
-@kernel
-def patches_to_point(
-    point: FloatArray, normal: FloatArray, corners: FloatArray, corner_count: IntArray, out: FloatArray
-) -> None:
-    """Form factors from one point (3,) to the fronts of n polygons (n, 4, 3), into out (n,)."""
-    scratch = np.empty((5, 3))
-    for i in range(len(corners)):
-        out[i] = point_form_factor(
-            point[0],
-            point[1],
-            point[2],
-            normal[0],
-            normal[1],
-            normal[2],
-            corners[i],
-            corner_count[i],
-            scratch,
-        )

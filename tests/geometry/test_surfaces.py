@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.geometry.scene import Material, Mesh, Scene, SceneObject
-from solver.geometry.surfaces import Surfaces, flatten, points_of
+from solver.geometry.surfaces import Surfaces, flatten
 from solver.geometry.transform import Transform
-from solver.types import FloatArray
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 CONCAVE = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]]
@@ -167,9 +166,3 @@ def test_a_scene_is_grey_if_all_of_it_is(
 ) -> None:
     s = flattened(thing("a", SQUARE), thing("b", SQUARE, reflectance=reflectance, emission=emission))
     assert s.is_grey == grey
-
-
-def test_points_of_a_json_list() -> None:
-    points: FloatArray = points_of([[1, 2, 3], [4, 5, 6]])
-    assert points.dtype == np.float64 and points.shape == (2, 3)
-    assert points_of([]).shape == (0, 3)
