@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.clipping import clip_to_plane
+from solver.geometry.distance import nearest_point
 from solver.kernels import kernel
 from solver.transport.contour import contour_exchange
 from solver.transport.lambert import contour_sum, point_form_factor
@@ -37,46 +38,6 @@ GAUSS_NODES: Final[FloatArray] = np.array(
 GAUSS_WEIGHTS: Final[FloatArray] = np.array(
     [np.pad(0.5 * w, (0, MAX_POINTS + 1 - len(w))) for _, w in _RULES]
 )
-
-
-@kernel
-def distance_to_polygon(
-    px: float, py: float, pz: float, polygon: FloatArray, count: int, normal: FloatArray
-) -> float:
-    """Distance from a point to a planar convex polygon (>= count, 3) with unit normal (3,)."""
-    inside = True
-    nearest = math.inf
-    for k in range(count):
-        m = (k + 1) % count
-        ex = polygon[m, 0] - polygon[k, 0]
-        ey = polygon[m, 1] - polygon[k, 1]
-        ez = polygon[m, 2] - polygon[k, 2]
-        rx = px - polygon[k, 0]
-        ry = py - polygon[k, 1]
-        rz = pz - polygon[k, 2]
-        side = (
-            (ey * rz - ez * ry) * normal[0]
-            + (ez * rx - ex * rz) * normal[1]
-            + (ex * ry - ey * rx) * normal[2]
-        )
-        if side < 0.0:
-            inside = False
-        square = ex * ex + ey * ey + ez * ez
-        t = 0.0
-        if square > 0.0:
-            t = min(max((rx * ex + ry * ey + rz * ez) / square, 0.0), 1.0)
-        dx = rx - t * ex
-        dy = ry - t * ey
-        dz = rz - t * ez
-        nearest = min(nearest, dx * dx + dy * dy + dz * dz)
-    if inside:
-        height = (
-            (px - polygon[0, 0]) * normal[0]
-            + (py - polygon[0, 1]) * normal[1]
-            + (pz - polygon[0, 2]) * normal[2]
-        )
-        return float(abs(height))
-    return math.sqrt(nearest)
 
 
 @kernel
@@ -177,11 +138,11 @@ def exchange_area(
         kept1 = clip_to_plane(first, count1, normal2, dot3(normal2, second[0]), side_tolerance, scratch[0])
         return contour_exchange(scratch[0], kept1, scratch[1], kept2)
     if area1 <= area2:
-        n = _receiver_points(first, count1, second, count2, normal2, tolerance)
+        n = _receiver_points(first, count1, second, count2, normal2, tolerance, scratch[0, 0])
         if n <= MAX_POINTS:
             return averaged_exchange(first, count1, normal1, area1, n, second, count2)
     else:
-        n = _receiver_points(second, count2, first, count1, normal1, tolerance)
+        n = _receiver_points(second, count2, first, count1, normal1, tolerance, scratch[0, 0])
         if n <= MAX_POINTS:
             return averaged_exchange(second, count2, normal2, area2, n, first, count1)
     return contour_exchange(first, count1, second, count2)
@@ -217,6 +178,7 @@ def _receiver_points(
     source_count: int,
     source_normal: FloatArray,
     tolerance: float,
+    nearest: FloatArray,
 ) -> int:
     cx = 0.0
     cy = 0.0
@@ -234,7 +196,7 @@ def _receiver_points(
         dy = receiver[k, 1] - cy
         dz = receiver[k, 2] - cz
         square = max(square, dx * dx + dy * dy + dz * dz)
-    distance = distance_to_polygon(cx, cy, cz, source, source_count, source_normal)
+    distance = math.sqrt(nearest_point(cx, cy, cz, source, source_count, source_normal, nearest))
     return points_needed(distance, math.sqrt(square), tolerance)
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from solver.geometry.distance import nearest_point
 from solver.kernels import kernel
 from solver.transport.lambert import point_form_factor
 from solver.types import FloatArray
@@ -145,7 +146,7 @@ def form_factor_variation(
         if missed > 0.0:
             residual = max(residual, missed * max(mean, total / count))
     # The spot that the points may have missed.
-    distance = _square_distance(
+    distance = nearest_point(
         source_centroid[0], source_centroid[1], source_centroid[2], receiver, count, normal, scratch[0]
     )
     reach = _FOOTPRINT * max(distance, 0.25 * radius2)
@@ -189,56 +190,3 @@ def _corner_jacobian(polygon: FloatArray, k: int, m: int, n: int, normal: FloatA
     return float(
         (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
     )
-
-
-@kernel
-def _square_distance(
-    x: float,
-    y: float,
-    z: float,
-    polygon: FloatArray,
-    count: int,
-    normal: FloatArray,
-    nearest: FloatArray,
-) -> float:
-    """Squared distance (m2) of a point from a convex polygon (4, 3), and its nearest point (3,)."""
-    least = math.inf
-    inside = True
-    for k in range(count):
-        m = (k + 1) % count
-        ex = polygon[m, 0] - polygon[k, 0]
-        ey = polygon[m, 1] - polygon[k, 1]
-        ez = polygon[m, 2] - polygon[k, 2]
-        px = x - polygon[k, 0]
-        py = y - polygon[k, 1]
-        pz = z - polygon[k, 2]
-        left = (
-            normal[0] * (ey * pz - ez * py)
-            + normal[1] * (ez * px - ex * pz)
-            + normal[2] * (ex * py - ey * px)
-        )
-        if left >= 0.0:
-            continue
-        inside = False
-        along = (px * ex + py * ey + pz * ez) / (ex * ex + ey * ey + ez * ez)
-        along = min(1.0, max(0.0, along))
-        dx = px - along * ex
-        dy = py - along * ey
-        dz = pz - along * ez
-        square = dx * dx + dy * dy + dz * dz
-        if square < least:
-            least = square
-            nearest[0] = x - dx
-            nearest[1] = y - dy
-            nearest[2] = z - dz
-    if inside:
-        height = (
-            (x - polygon[0, 0]) * normal[0]
-            + (y - polygon[0, 1]) * normal[1]
-            + (z - polygon[0, 2]) * normal[2]
-        )
-        nearest[0] = x - height * normal[0]
-        nearest[1] = y - height * normal[1]
-        nearest[2] = z - height * normal[2]
-        return float(height * height)
-    return least
