@@ -137,8 +137,8 @@ class Linker:
         def work(start: int, stop: int) -> None:
             inherit_blockers(
                 p, q, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count, s.normal,
-                self.spheres, parent_start, parent_count, parent_pool, self.side_tolerance, start, stop,
-                room, loose, kind, kept,
+                parent_start, parent_count, parent_pool, self.side_tolerance, start, stop, room, loose, kind,
+                kept,
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)

@@ -9,6 +9,7 @@ from solver.transport.exchange import exchange_area, heights
 from solver.transport.variation import form_factor_variation, solve_moment
 from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.blockers import inherited_blockers
+from solver.visibility.culling import BLOCK, LANES, gather_blocks
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE
 
 
@@ -54,7 +55,6 @@ def inherit_blockers(
     patch_corners: Corners,
     patch_counts: IntArray,
     normals: FloatArray,
-    spheres: FloatArray,
     parent_start: Int64Array,
     parent_count: IntArray,
     parent_pool: IntArray,
@@ -68,17 +68,29 @@ def inherit_blockers(
 ) -> None:
     """Visibility classes of pairs [start, stop), and which blockers of the parents' links are left."""
     planes = np.empty((MAX_PLANES, 4))
+    work = np.empty(5 * LANES)
+    verdict = np.empty(LANES, dtype=np.uint8)
+    most = 0
+    for pair in range(start, stop):
+        most = max(most, parent_count[pair])
+    blocks = np.empty((most + LANES - 1) // LANES * BLOCK)
+    gathered = -1
     for pair in range(start, stop):
         if parent_count[pair] == 0:
             kind[pair] = FULL
             kept[pair] = 0
             continue
+        if gathered < 0 or parent_start[pair] != parent_start[gathered]:
+            gather_blocks(
+                patch_corners, normals, parent_pool, parent_start[pair], parent_count[pair], blocks
+            )
+            gathered = pair
         i = p[pair]
         j = q[pair]
         kind[pair], kept[pair] = inherited_blockers(
             corners[i], counts[i], normals[patch[i]], corners[j], counts[j], normals[patch[j]],
-            patch_corners, patch_counts, normals, spheres, parent_pool, parent_start[pair],
-            parent_count[pair], tolerance, planes, out, room[pair],
+            patch_corners, patch_counts, normals, parent_pool, parent_start[pair], parent_count[pair], blocks,
+            tolerance, planes, work, verdict, out, room[pair],
         )  # fmt: skip
 
 

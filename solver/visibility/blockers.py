@@ -6,18 +6,13 @@ only at what blocked their parents.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray, IntArray
+from solver.types import ByteArray, Corners, FloatArray, IntArray
 from solver.visibility.bvh import walk_hierarchy
+from solver.visibility.culling import BLOCK, LANES, MAY_COVER, OUTSIDE, cull_block
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, can_block, covers, shaft_planes
-
-MANY: Final = 48
-"""A list longer than this is culled by spheres alone."""
-
 
 @kernel
 def first_blockers(
@@ -96,53 +91,37 @@ def inherited_blockers(
     corners: Corners,
     counts: IntArray,
     normals: FloatArray,
-    spheres: FloatArray,
     parents: IntArray,
     parent_start: int,
     parent_count: int,
+    blocks: FloatArray,
     tolerance: float,
     planes: FloatArray,
+    work: FloatArray,
+    verdict: ByteArray,
     out: IntArray,
     used: int,
 ) -> tuple[int, int]:
     """Which of the parent link's blockers still block a child pair: (visibility, number kept).
 
-    The kept ones are written to out[used:]; of a long list those whose sphere reaches into the shaft are
-    kept, which is more than need be and sooner done. corners, counts, normals, spheres are the patches'.
+    The kept ones are written to out[used:]. corners, counts, normals are the patches'; `blocks` holds the
+    parent's blockers as `gather_blocks` lays them out.
     """
     plane_count = shaft_planes(first, n1, normal1, second, n2, normal2, planes)
-    by_sphere = parent_count > MANY
-    culled_by = 0
     kept = 0
-    for k in range(parent_start, parent_start + parent_count):
-        b = parents[k]
-        if by_sphere:
-            # The plane that culled the last one is likely to cull its neighbour.
-            if _is_outside(spheres[b], planes[culled_by], tolerance):
+    for block in range(0, parent_count, LANES):
+        n = min(LANES, parent_count - block)
+        lanes = blocks[block // LANES * BLOCK : (block // LANES + 1) * BLOCK]
+        cull_block(lanes, n, first, second, planes, plane_count, tolerance, work, verdict)
+        for k in range(n):
+            if verdict[k] == OUTSIDE:
                 continue
-            outside = False
-            for p in range(plane_count):
-                if _is_outside(spheres[b], planes[p], tolerance):
-                    culled_by = p
-                    outside = True
-                    break
-            if outside:
-                continue
-        elif not can_block(
-            corners[b], counts[b], normals[b], spheres[b], first, n1, second, n2, planes, plane_count,
-            tolerance,
-        ):  # fmt: skip
-            continue
-        if covers(corners[b], counts[b], normals[b], first, n1, second, n2, tolerance):
-            out[used] = b
-            return NONE, 1
-        out[used + kept] = b
-        kept += 1
+            b = parents[parent_start + block + k]
+            if verdict[k] == MAY_COVER and covers(
+                corners[b], counts[b], normals[b], first, n1, second, n2, tolerance
+            ):
+                out[used] = b
+                return NONE, 1
+            out[used + kept] = b
+            kept += 1
     return (FULL if kept == 0 else PARTIAL), kept
-
-
-@kernel
-def _is_outside(sphere: FloatArray, plane: FloatArray, tolerance: float) -> bool:
-    """Whether a sphere (4,) lies behind a plane (4,)."""
-    height = plane[0] * sphere[0] + plane[1] * sphere[1] + plane[2] * sphere[2] - plane[3]
-    return bool(height + sphere[3] <= tolerance)

@@ -15,6 +15,7 @@ from solver.types import FloatArray, IntArray, Points
 from solver.visibility.blockers import first_blockers, inherited_blockers
 from solver.visibility.brute_force import blocks, visible_fraction
 from solver.visibility.bvh import build_hierarchy
+from solver.visibility.culling import BLOCK, LANES, gather_blocks
 from solver.visibility.shafts import (
     FULL,
     MAX_PLANES,
@@ -136,10 +137,12 @@ def test_inherited_classes_and_blockers(soup: Soup, seed: int) -> None:
         first, second = (_part(soup.polygon(k), random) for k in (p, q))
         parents = np.array(sorted(blockers), dtype=np.int32)
         out, planes = np.empty(len(parents), dtype=np.int32), np.empty((MAX_PLANES, 4))
+        lanes = np.empty(-(-len(parents) // LANES) * BLOCK)
+        gather_blocks(s.corners, s.normal, parents, 0, len(parents), lanes)
         part_kind, kept = inherited_blockers(
             _padded(first), len(first), s.normal[p], _padded(second), len(second), s.normal[q],
-            s.corners, s.corner_count, s.normal, bounding_spheres(s.corners), parents, 0, len(parents),
-            side_tolerance(soup), planes, out, 0,
+            s.corners, s.corner_count, s.normal, parents, 0, len(parents), lanes, side_tolerance(soup),
+            planes, np.empty(5 * LANES), np.empty(LANES, dtype=np.uint8), out, 0,
         )  # fmt: skip
         remaining = set(out[:kept].tolist())
         assert remaining <= blockers
