@@ -23,7 +23,7 @@ from solver.visibility.blockers import first_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
-from solver.visibility.shafts import NONE, PARTIAL, bounding_spheres
+from solver.visibility.shafts import NONE, PARTIAL
 
 _CHUNK: Final = 256
 _LEAST: Final = 32
@@ -48,8 +48,6 @@ class Linker:
     surfaces: Surfaces
     rays: RayScene
     hierarchy: Hierarchy
-    spheres: FloatArray
-    """(p, 4) around the patches"""
     side_tolerance: float
     """metres"""
     exchange_tolerance: float
@@ -63,7 +61,6 @@ class Linker:
             surfaces,
             rays,
             build_hierarchy(surfaces.corners, fronts),
-            bounding_spheres(surfaces.corners),
             tolerances.SIDE * surfaces.size,
             exchange_tolerance,
         )
@@ -103,7 +100,7 @@ class Linker:
             while at < stop:
                 pool = np.empty(room, dtype=np.int32)
                 used = first_blockers(
-                    p, q, s.corners, s.corner_count, s.normal, self.spheres, h.low, h.high, h.skip, h.first,
+                    p, q, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip, h.first,
                     h.count, h.order, self.side_tolerance, at, stop, kind, kept, pool,
                 )  # fmt: skip
                 done = stop - at if used >= 0 else -1 - used

@@ -81,9 +81,7 @@ def inherit_blockers(
             kept[pair] = 0
             continue
         if gathered < 0 or parent_start[pair] != parent_start[gathered]:
-            gather_blocks(
-                patch_corners, normals, parent_pool, parent_start[pair], parent_count[pair], blocks
-            )
+            gather_blocks(patch_corners, normals, parent_pool, parent_start[pair], parent_count[pair], blocks)
             gathered = pair
         i = p[pair]
         j = q[pair]

@@ -11,8 +11,9 @@ import numpy as np
 from solver.kernels import kernel
 from solver.types import ByteArray, Corners, FloatArray, IntArray
 from solver.visibility.bvh import walk_hierarchy
-from solver.visibility.culling import BLOCK, LANES, MAY_COVER, OUTSIDE, cull_block
-from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, can_block, covers, shaft_planes
+from solver.visibility.culling import BLOCK, LANES, MAY_COVER, OUTSIDE, cull_block, gather_blocks
+from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, covers, shaft_planes
+
 
 @kernel
 def first_blockers(
@@ -21,7 +22,6 @@ def first_blockers(
     corners: Corners,
     counts: IntArray,
     normals: FloatArray,
-    spheres: FloatArray,
     low: FloatArray,
     high: FloatArray,
     skip: IntArray,
@@ -42,6 +42,9 @@ def first_blockers(
     """
     planes = np.empty((MAX_PLANES, 4))
     candidates = np.empty(len(order), dtype=np.int32)
+    blocks = np.empty((len(order) + LANES - 1) // LANES * BLOCK)
+    work = np.empty(5 * LANES)
+    verdict = np.empty(LANES, dtype=np.uint8)
     used = 0
     for pair in range(start, stop):
         p = pair_p[pair]
@@ -54,30 +57,62 @@ def first_blockers(
         )
         if used + found > len(pool):
             return -1 - (pair - start)
-        kept = 0
-        hidden = False
-        for k in range(found):
-            b = candidates[k]
+        gather_blocks(corners, normals, candidates, 0, found, blocks)
+        visibility[pair], blocker_count[pair] = _cull(
+            corners, counts, normals, p, q, corners[p], counts[p], corners[q], counts[q], planes,
+            plane_count, candidates, 0, found, blocks, tolerance, work, verdict, pool, used,
+        )  # fmt: skip
+        used += blocker_count[pair]
+    return used
+
+
+@kernel
+def _cull(
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    p: int,
+    q: int,
+    first: FloatArray,
+    n1: int,
+    second: FloatArray,
+    n2: int,
+    planes: FloatArray,
+    plane_count: int,
+    candidates: IntArray,
+    start: int,
+    count: int,
+    blocks: FloatArray,
+    tolerance: float,
+    work: FloatArray,
+    verdict: ByteArray,
+    out: IntArray,
+    used: int,
+) -> tuple[int, int]:
+    """Which of the patches candidates[start : start + count], but p and q, block a pair of elements.
+
+    `blocks` holds them as `gather_blocks` lays them out. Returns the visibility class and the number of
+    blockers, which are written to out[used:].
+    """
+    kept = 0
+    for block in range(0, count, LANES):
+        n = min(LANES, count - block)
+        lanes = blocks[block // LANES * BLOCK : (block // LANES + 1) * BLOCK]
+        cull_block(lanes, n, first, second, planes, plane_count, tolerance, work, verdict)
+        for k in range(n):
+            if verdict[k] == OUTSIDE:
+                continue
+            b = candidates[start + block + k]
             if b in (p, q):
                 continue
-            if not can_block(
-                corners[b], counts[b], normals[b], spheres[b], corners[p], counts[p], corners[q], counts[q],
-                planes, plane_count, tolerance,
-            ):  # fmt: skip
-                continue
-            pool[used + kept] = b
-            kept += 1
-            if not hidden and covers(
-                corners[b], counts[b], normals[b], corners[p], counts[p], corners[q], counts[q], tolerance
+            if verdict[k] == MAY_COVER and covers(
+                corners[b], counts[b], normals[b], first, n1, second, n2, tolerance
             ):
-                hidden = True
-                pool[used] = b
-                kept = 1
-                break
-        visibility[pair] = NONE if hidden else (FULL if kept == 0 else PARTIAL)
-        blocker_count[pair] = kept
-        used += kept
-    return used
+                out[used] = b
+                return NONE, 1
+            out[used + kept] = b
+            kept += 1
+    return (FULL if kept == 0 else PARTIAL), kept
 
 
 @kernel
@@ -108,20 +143,7 @@ def inherited_blockers(
     parent's blockers as `gather_blocks` lays them out.
     """
     plane_count = shaft_planes(first, n1, normal1, second, n2, normal2, planes)
-    kept = 0
-    for block in range(0, parent_count, LANES):
-        n = min(LANES, parent_count - block)
-        lanes = blocks[block // LANES * BLOCK : (block // LANES + 1) * BLOCK]
-        cull_block(lanes, n, first, second, planes, plane_count, tolerance, work, verdict)
-        for k in range(n):
-            if verdict[k] == OUTSIDE:
-                continue
-            b = parents[parent_start + block + k]
-            if verdict[k] == MAY_COVER and covers(
-                corners[b], counts[b], normals[b], first, n1, second, n2, tolerance
-            ):
-                out[used] = b
-                return NONE, 1
-            out[used + kept] = b
-            kept += 1
-    return (FULL if kept == 0 else PARTIAL), kept
+    return _cull(
+        corners, counts, normals, -1, -1, first, n1, second, n2, planes, plane_count, parents, parent_start,
+        parent_count, blocks, tolerance, work, verdict, out, used,
+    )  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver import tolerances
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray
+from solver.types import FloatArray
 
 MAX_PLANES: Final = 20
 """Two polygon planes, and at most one supporting plane on either side of each of eight edges."""
@@ -102,61 +102,6 @@ def shaft_planes(
                     count += 1
                     break
     return count
-
-
-def bounding_spheres(corners: Corners) -> FloatArray:
-    """Centres and radii (p, 4) of spheres around polygons (p, 4, 3)."""
-    center = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
-    return np.concatenate([center, radius[:, None]], axis=1)
-
-
-@kernel
-def can_block(
-    blocker: FloatArray,
-    n: int,
-    normal: FloatArray,
-    sphere: FloatArray,
-    first: FloatArray,
-    n1: int,
-    second: FloatArray,
-    n2: int,
-    planes: FloatArray,
-    plane_count: int,
-    tolerance: float,
-) -> bool:
-    """Whether a convex polygon (4, 3) reaches into the shaft and has the elements on both its sides.
-
-    Its sphere (4,) settles most planes.
-    """
-    for p in range(plane_count):
-        height = planes[p, 0] * sphere[0] + planes[p, 1] * sphere[1] + planes[p, 2] * sphere[2] - planes[p, 3]
-        if height + sphere[3] <= tolerance:
-            return False
-        if height - sphere[3] > tolerance:
-            continue
-        outside = True
-        for k in range(n):
-            height = (
-                planes[p, 0] * blocker[k, 0] + planes[p, 1] * blocker[k, 1] + planes[p, 2] * blocker[k, 2]
-            )
-            if height - planes[p, 3] > tolerance:
-                outside = False
-                break
-        if outside:
-            return False
-    offset = normal[0] * blocker[0, 0] + normal[1] * blocker[0, 1] + normal[2] * blocker[0, 2]
-    above = False
-    below = False
-    for k in range(n1):
-        height = normal[0] * first[k, 0] + normal[1] * first[k, 1] + normal[2] * first[k, 2] - offset
-        above = above or height > tolerance
-        below = below or height < -tolerance
-    for k in range(n2):
-        height = normal[0] * second[k, 0] + normal[1] * second[k, 1] + normal[2] * second[k, 2] - offset
-        above = above or height > tolerance
-        below = below or height < -tolerance
-    return above and below
 
 
 @kernel

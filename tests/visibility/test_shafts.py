@@ -21,7 +21,6 @@ from solver.visibility.shafts import (
     MAX_PLANES,
     NONE,
     PARTIAL,
-    bounding_spheres,
     shaft_planes,
 )
 from tests.visibility.soups import Soup, polygons, soup_of, soups
@@ -67,7 +66,7 @@ def classify(soup: Soup, pool_size: int | None = None) -> Classified:
     while at < len(p):
         pool = np.empty(pool_size or len(p) * s.patch_count, dtype=np.int32)
         used = first_blockers(
-            p, q, s.corners, s.corner_count, s.normal, bounding_spheres(s.corners), tree.low, tree.high,
+            p, q, s.corners, s.corner_count, s.normal, tree.low, tree.high,
             tree.skip, tree.first, tree.count, tree.order, side_tolerance(soup), at, len(p), kind, count,
             pool,
         )  # fmt: skip
