@@ -40,12 +40,6 @@ class GrowingArray(Generic[T]):
         """Append rows."""
         self._extend(len(rows))[...] = rows
 
-    def keep(self, mask: NDArray[np.bool_]) -> None:
-        """Drop the rows where `mask` is false."""
-        kept = self._data[: self._size][mask]
-        self._data[: len(kept)] = kept
-        self._size = len(kept)
-
     def _extend(self, count: int) -> NDArray[T]:
         needed = self._size + count
         if needed > len(self._data):

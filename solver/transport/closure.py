@@ -84,7 +84,7 @@ def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterat
     unit[:, 0] = 1.0
     highest = state.reflectance.max(axis=1)[tree.patch]
     for _ in range(_STEPS):
-        row_sum = state.gather(unit)[:, 0, 0]
+        row_sum = (yield from state.gather_in_steps(unit))[:, 0, 0]
         yield
         if closed:
             target = np.where(leaf & (row_sum > _LEAST_SUM), 1.0, row_sum)
@@ -101,7 +101,7 @@ def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterat
             return
         state.closure[off] *= np.sqrt(target[off] / row_sum[off])
     if closed:
-        rows = state.gather(unit)[:, :, 0]
+        rows = (yield from state.gather_in_steps(unit))[:, :, 0]
         state.remainder[leaf] = -rows[leaf]
         state.remainder[leaf, 0] += 1.0
         yield

@@ -6,14 +6,18 @@ that holds the one and an element that holds the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Final
 
 import numpy as np
 
 from solver.arrays import GrowingArray
 from solver.kernels import kernel
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
+
+_POOLED: Final = 1 << 21
+"""Entries of blocker lists copied between two yields."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,35 +51,30 @@ class LinkBatch:
     blockers: IntArray
     """all lists, one after the other: patches"""
 
-    @staticmethod
-    def joined(batches: Sequence[LinkBatch]) -> LinkBatch:
-        """Batches, at least one, as one."""
-        return LinkBatch(
-            **{
-                column.name: np.concatenate([getattr(batch, column.name) for batch in batches])
-                for column in fields(LinkBatch)
-            }
-        )
+
+_COLUMNS: Final = tuple(column.name for column in fields(LinkBatch) if column.name != "blockers")
+"""Names of what the table holds a row of for each link, as in `LinkBatch`."""
 
 
 class LinkTable:
     """Struct of growing arrays over the links; the columns are those of `LinkBatch`."""
 
-    def __init__(self) -> None:
-        self._p = GrowingArray((), np.int32, 4096)
-        self._q = GrowingArray((), np.int32, 4096)
-        self._open = GrowingArray((), np.float64, 4096)
-        self._visibility = GrowingArray((), np.float64, 4096)
-        self._samples = GrowingArray((), np.int32, 4096)
-        self._noise = GrowingArray((), np.float64, 4096)
-        self._kind = GrowingArray((), np.int32, 4096)
-        self._slope_p = GrowingArray((2,), np.float64, 4096)
-        self._slope_q = GrowingArray((2,), np.float64, 4096)
-        self._residual_p = GrowingArray((), np.float64, 4096)
-        self._residual_q = GrowingArray((), np.float64, 4096)
-        self._blocker_start = GrowingArray((), np.int64, 4096)
-        self._blocker_count = GrowingArray((), np.int32, 4096)
-        self._pool = GrowingArray((), np.int32, 4096)
+    def __init__(self, capacity: int = 4096) -> None:
+        """Without links; `capacity` of them fit before the arrays grow."""
+        self._p = GrowingArray((), np.int32, capacity)
+        self._q = GrowingArray((), np.int32, capacity)
+        self._open_exchange = GrowingArray((), np.float64, capacity)
+        self._visibility = GrowingArray((), np.float64, capacity)
+        self._samples = GrowingArray((), np.int32, capacity)
+        self._noise = GrowingArray((), np.float64, capacity)
+        self._kind = GrowingArray((), np.int32, capacity)
+        self._slope_p = GrowingArray((2,), np.float64, capacity)
+        self._slope_q = GrowingArray((2,), np.float64, capacity)
+        self._residual_p = GrowingArray((), np.float64, capacity)
+        self._residual_q = GrowingArray((), np.float64, capacity)
+        self._blocker_count = GrowingArray((), np.int32, capacity)
+        self._blocker_start = GrowingArray((), np.int64, capacity)
+        self._pool = GrowingArray((), np.int32, capacity)
 
     def __len__(self) -> int:
         return len(self._p)
@@ -93,7 +92,7 @@ class LinkTable:
     @property
     def open_exchange(self) -> FloatArray:
         """(n,) m2 without occlusion"""
-        return self._open.live
+        return self._open_exchange.live
 
     @property
     def visibility(self) -> FloatArray:
@@ -158,54 +157,47 @@ class LinkTable:
     @property
     def nbytes(self) -> int:
         """Bytes held."""
-        return self._pool.nbytes + sum(column.nbytes for column in self._columns())
+        columns: list[GrowingArray[Any]] = [getattr(self, f"_{name}") for name in _COLUMNS]
+        return self._pool.nbytes + self._blocker_start.nbytes + sum(column.nbytes for column in columns)
 
     def append(self, batch: LinkBatch) -> None:
         """Take evaluated links in."""
         start = len(self._pool) + np.cumsum(batch.blocker_count, dtype=np.int64) - batch.blocker_count
-        self._p.append(batch.p)
-        self._q.append(batch.q)
-        self._open.append(batch.open_exchange)
-        self._visibility.append(batch.visibility)
-        self._samples.append(batch.samples)
-        self._noise.append(batch.noise)
-        self._kind.append(batch.kind)
-        self._slope_p.append(batch.slope_p)
-        self._slope_q.append(batch.slope_q)
-        self._residual_p.append(batch.residual_p)
-        self._residual_q.append(batch.residual_q)
+        for name in _COLUMNS:
+            getattr(self, f"_{name}").append(getattr(batch, name))
         self._blocker_start.append(start)
-        self._blocker_count.append(batch.blocker_count)
         self._pool.append(batch.blockers)
 
-    def remove(self, gone: BoolArray) -> None:
-        """Drop the links where `gone` (n,) is true; blocker lists are compacted once half are stale."""
-        keep = ~gone
-        for column in self._columns():
-            column.keep(keep)
-        used = int(self.blocker_count.sum())
-        if len(self._pool) > 2 * used + 4096:
-            compact = take_ranges(self.pool, self.blocker_start, self.blocker_count)
-            self._pool = GrowingArray((), np.int32, max(4096, used))
-            self._pool.append(compact)
-            self.blocker_start[...] = np.cumsum(self.blocker_count, dtype=np.int64) - self.blocker_count
+    def replace(self, gone: BoolArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
+        """Put links in the place of those where `gone` (n,) is true; yields every few milliseconds.
 
-    def _columns(self) -> tuple[GrowingArray[np.generic], ...]:
-        return (  # type: ignore[return-value]
-            self._p,
-            self._q,
-            self._open,
-            self._visibility,
-            self._samples,
-            self._noise,
-            self._kind,
-            self._slope_p,
-            self._slope_q,
-            self._residual_p,
-            self._residual_q,
-            self._blocker_start,
-            self._blocker_count,
-        )
+        The table changes in one go, after the last yield.
+        """
+        kept = np.flatnonzero(~gone)
+        rows = len(kept) + sum(len(batch.p) for batch in batches)
+        fresh = LinkTable(rows)
+        for name in _COLUMNS:
+            column: GrowingArray[Any] = getattr(fresh, f"_{name}")
+            column.append(getattr(self, name)[kept])
+            for batch in batches:
+                column.append(getattr(batch, name))
+            yield
+        count = fresh.blocker_count
+        start = np.cumsum(count, dtype=np.int64) - count
+        fresh._blocker_start.append(start)
+        pool = GrowingArray((), np.int32, int(count.sum()))
+        at = 0
+        while at < len(kept):
+            stop = max(at + 1, int(np.searchsorted(start[: len(kept)], start[at] + _POOLED, side="right")))
+            part = kept[at:stop]
+            pool.append(take_ranges(self.pool, self.blocker_start[part], self.blocker_count[part]))
+            at = stop
+            yield
+        for batch in batches:
+            pool.append(batch.blockers)
+            yield
+        fresh._pool = pool
+        self.__dict__.update(fresh.__dict__)
 
 
 @kernel

@@ -15,6 +15,7 @@ Functions on elements are arrays (n, 3, channels): mean, and the gradient by the
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,9 @@ _MANY: Final = 1 << 16
 _PARTS: Final = 2
 """Of so many links each part has an array of its own to gather into; the number is fixed, so that sums are
 the same on any machine."""
+
+_AT_ONCE: Final = 1 << 17
+"""Links gathered over between two yields."""
 
 
 @kernel
@@ -115,14 +119,15 @@ def gather(
             received[j, 2, c] += to_j * bv * mi
 
 
-def irradiance(
+def irradiance_in_steps(
     tree: ElementTree, links: LinkTable, closure: FloatArray, remainder: FloatArray, radiosity: FloatArray
-) -> FloatArray:
+) -> Generator[None, None, FloatArray]:
     """Irradiance functions (n, 3, channels) on every element from the leaf radiosities (n, 3, channels).
 
-    Inner rows of `radiosity` are ignored; inner rows of the result hold what the leaves below share
-    through links of the inner element and its ancestors. `closure` (n,) scales the leaves at both ends
-    of a transfer and `remainder` (n, 3) couples each leaf with itself (see `closure.py`).
+    Yields every few milliseconds and returns them. Inner rows of `radiosity` are ignored; inner rows of
+    the result hold what the leaves below share through links of the inner element and its ancestors.
+    `closure` (n,) scales the leaves at both ends of a transfer and `remainder` (n, 3) couples each leaf
+    with itself (see `closure.py`).
     """
     sent = radiosity * closure[:, None, None]
     moments = np.empty_like(sent)
@@ -131,14 +136,21 @@ def irradiance(
     received = np.zeros((parts, *sent.shape))
     exchange = links.exchange
 
-    def work(start: int, stop: int) -> None:
-        for part in range(start, stop):
-            gather(
-                links.p, links.q, exchange, links.slope_p, links.slope_q, tree.area, moments,
-                len(links) * part // parts, len(links) * (part + 1) // parts, received[part],
-            )  # fmt: skip
+    pieces = max(1, -(-len(links) // _AT_ONCE))
+    for piece in range(pieces):
+        if piece:
+            yield
 
-    run_chunks(work, parts, 1)
+        def work(start: int, stop: int, piece: int = piece) -> None:
+            for part in range(start, stop):
+                at = part * pieces + piece
+                whole = parts * pieces
+                gather(
+                    links.p, links.q, exchange, links.slope_p, links.slope_q, tree.area, moments,
+                    len(links) * at // whole, len(links) * (at + 1) // whole, received[part],
+                )  # fmt: skip
+
+        run_chunks(work, parts, 1)
     total: FloatArray = received[0] if parts == 1 else received.sum(axis=0)
     push(tree.parent, tree.offset, total)
     total *= closure[:, None, None]
@@ -148,6 +160,18 @@ def irradiance(
         total[:, 0] += np.einsum("nk,nkc->nc", remainder, own)
         total[:, 1:] += remainder[:, 1:, None] * own[:, :1]
     return total
+
+
+def irradiance(
+    tree: ElementTree, links: LinkTable, closure: FloatArray, remainder: FloatArray, radiosity: FloatArray
+) -> FloatArray:
+    """As `irradiance_in_steps`, in one."""
+    work = irradiance_in_steps(tree, links, closure, remainder, radiosity)
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return np.asarray(end.value)
 
 
 def means(tree: ElementTree, functions: FloatArray) -> Spectra:

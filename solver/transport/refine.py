@@ -11,7 +11,6 @@ import numpy as np
 from solver.transport.estimate import ErrorEstimate
 from solver.transport.field import SolveOutcome
 from solver.transport.linking import Light, Linker
-from solver.transport.links import LinkBatch
 from solver.transport.oracle import MAX_SAMPLES, RESAMPLE, SPLIT_P, SPLIT_Q, child_pairs, threshold_for_share
 from solver.transport.pace import Pace
 from solver.transport.settings import SolverSettings
@@ -101,10 +100,8 @@ def refine(state: TransportState, linker: Linker, pace: Pace, light: Light, choi
         yield int(batch.samples.sum())
     gone = np.zeros(len(links), dtype=bool)
     gone[chosen] = True
-    links.remove(gone)
-    yield 0
-    links.append(LinkBatch.joined(batches))
-    yield 0
+    for _ in links.replace(gone, batches):
+        yield 0
 
 
 def _splittable(state: TransportState, settings: SolverSettings, elements: IntArray) -> BoolArray:

@@ -18,9 +18,10 @@ from solver.types import FloatArray
 MOST_STEPS: Final = 500
 
 
-def settle(state: TransportState, target: float) -> Generator[float, None, bool]:
-    """Work until the unshot radiosity is below `target` of the radiosity, both RMS; yields its share.
+def settle(state: TransportState, target: float) -> Generator[float | None, None, bool]:
+    """Work until the unshot radiosity is below `target` of the radiosity, both RMS.
 
+    Yields the unshot share, or None in the midst of a gather.
     Emission does not count as radiosity here: a small bright lamp would outshine all that is unshot.
     Changes the radiosity and the irradiance of `state`. Returns whether the target was met; it is not where
     links in error let light multiply.
@@ -36,7 +37,7 @@ def settle(state: TransportState, target: float) -> Generator[float, None, bool]
         reflectance > 0.0, area[:, None, None] / np.where(reflectance > 0.0, reflectance, 1.0), 0.0
     )
     state.radiosity[~active] = emission[~active]
-    state.received = state.gather(state.radiosity)
+    state.received = yield from state.gather_in_steps(state.radiosity)
     unshot = np.where(active, emission + reflectance * state.received - state.radiosity, 0.0)
     direction = unshot.copy()
     energy = _inner(tree.moment, weight, unshot, unshot)
@@ -49,7 +50,8 @@ def settle(state: TransportState, target: float) -> Generator[float, None, bool]
         yield float((area[:, None] * np.abs(unshot[:, 0])).sum()) / max(held, 1e-300)
         if left <= target * scale:
             return True
-        arrived = state.gather(direction)
+        arrived = yield from state.gather_in_steps(direction)
+        yield None
         moved = np.where(active, direction - reflectance * arrived, 0.0)
         curvature = _inner(tree.moment, weight, direction, moved)
         if np.any((curvature <= 0.0) & (energy > 0.0)):

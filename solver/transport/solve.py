@@ -22,7 +22,6 @@ from solver.transport.estimate import estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.gather import irradiance_at
 from solver.transport.linking import Light, Linker
-from solver.transport.links import LinkBatch
 from solver.transport.pace import Pace
 from solver.transport.pushpull import means
 from solver.transport.refine import choose, refine
@@ -243,9 +242,11 @@ class RadiositySolver:
         work = settle(self._state, target)
         while True:
             try:
-                self.unshot_fraction = next(work)
+                share = next(work)
             except StopIteration as end:
                 return bool(end.value)
+            if share is not None:
+                self.unshot_fraction = share
             yield True
 
     def _report_progress(self) -> None:
@@ -272,8 +273,8 @@ class RadiositySolver:
                 left = 1.0 - (start + rows * part.stop / len(p)) / n
                 self.progress = max(self.progress, _LINKING * (1.0 - max(0.0, left) ** 2))
                 yield True
-            if batches:
-                self._state.links.append(LinkBatch.joined(batches))
+            for batch in batches:
+                self._state.links.append(batch)
             if len(self._state.links) > self.settings.max_links:
                 self.outcome = SolveOutcome.LINK_LIMIT
                 return

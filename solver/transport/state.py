@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
-from solver.transport.pushpull import irradiance
+from solver.transport.pushpull import irradiance, irradiance_in_steps
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Spectra
 
 
@@ -76,6 +77,11 @@ class TransportState:
         """Irradiance functions (n, 3, channels) from the leaf radiosities (n, 3, channels)."""
         self.gathers += 1
         return irradiance(self.tree, self.links, self.closure, self.remainder, radiosity)
+
+    def gather_in_steps(self, radiosity: FloatArray) -> Generator[None, None, FloatArray]:
+        """As `gather`; yields every few milliseconds."""
+        self.gathers += 1
+        return irradiance_in_steps(self.tree, self.links, self.closure, self.remainder, radiosity)
 
     def split(self, ids: IntArray) -> None:
         """Subdivide leaves; the children start with their parent's light."""

@@ -49,7 +49,7 @@ def lists(of: LinkBatch) -> list[list[int]]:
 @given(
     seed=st.integers(0, 1 << 30), steps=st.lists(st.tuples(st.integers(1, 3000), st.floats(0, 1)), max_size=6)
 )
-def test_table_holds_what_was_appended_and_not_removed(seed: int, steps: list[tuple[int, float]]) -> None:
+def test_table_holds_what_was_put_in_and_not_replaced(seed: int, steps: list[tuple[int, float]]) -> None:
     random = np.random.default_rng(seed)
     table = LinkTable()
     rows: dict[str, list[object]] = {name: [] for name in COLUMNS}
@@ -61,11 +61,14 @@ def test_table_holds_what_was_appended_and_not_removed(seed: int, steps: list[tu
             rows[name].extend(getattr(fresh, name).tolist())
         expected.extend(lists(fresh))
         gone = random.random(len(table)) < share
-        table.remove(gone)
+        others = [batch(random, 700), batch(random, 1)]
+        for _ in table.replace(gone, others):
+            assert len(table) == len(expected), "nothing changes before the end"
         keep = np.flatnonzero(~gone)
         for name in COLUMNS:
             rows[name] = [rows[name][k] for k in keep]
-        expected = [expected[k] for k in keep]
+            rows[name].extend(np.concatenate([getattr(other, name) for other in others]).tolist())
+        expected = [expected[k] for k in keep] + lists(others[0]) + lists(others[1])
         assert len(table) == len(expected)
         assert blockers(table) == expected
     for name in COLUMNS:
@@ -78,8 +81,9 @@ def test_stale_blockers_do_not_pile_up() -> None:
     table = LinkTable()
     for _ in range(30):
         table.append(batch(random, 3000))
-        table.remove(random.random(len(table)) < 0.9)
-    assert len(table.pool) <= 2 * table.blocker_count.sum() + 4096 + 5 * 3000
+        for _ in table.replace(random.random(len(table)) < 0.9, []):
+            pass
+    assert len(table.pool) == table.blocker_count.sum()
     assert table.nbytes < 4e6
 
 
