@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.seams import Seams, cut_borders, find_lines
+from solver.illumination.topology import Topology, connect
 from solver.kernels import inline_kernel, kernel
 from solver.rendering.middles import fill_middles
 from solver.rendering.reconstruction import vertex_irradiance
-from solver.rendering.seams import Seams, cut_borders, find_lines
-from solver.rendering.topology import Topology, connect
 from solver.transport.field import RadiosityField
 from solver.types import LUMINANCE_WEIGHTS, BoolArray, Float32Array, FloatArray, IntArray, Points
 

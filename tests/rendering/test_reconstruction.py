@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.topology import Topology, connect
 from solver.rendering.reconstruction import vertex_irradiance
 from solver.rendering.tessellation import Tessellator
-from solver.rendering.topology import Topology, connect
 from solver.transport.field import RadiosityField
 from solver.types import BoolArray, FloatArray, Points
 from tests.rendering.fields import SQUARE, Function, build_field, even, linear, polygons, surfaces_of, uneven

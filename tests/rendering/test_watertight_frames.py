@@ -7,10 +7,10 @@ import pytest
 
 from solver.geometry.scene import Camera, Mesh, SceneObject
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.topology import connect
 from solver.rendering.geometry_layers import rays
 from solver.rendering.renderer import FrameRenderer, Layer, Shading
 from solver.rendering.tessellation import RenderMesh, Tessellator
-from solver.rendering.topology import connect
 from solver.types import FloatArray, Points, Vector
 from tests.rendering.fields import Split, build_field, constant, polygons, surfaces_of, towards, uneven
 

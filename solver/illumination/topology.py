@@ -1,4 +1,4 @@
-"""How the leaves of a field hang together: shared vertices, opposite edges, vertices inside edges.
+"""How leaves hang together: shared vertices, opposite edges, vertices inside edges.
 
 A leaf's neighbours may be smaller than itself. Their corners on its edge are T-vertices: drawn as they
 are, they leave cracks, since a rasteriser rounds them off the edge. Here each edge is told which
@@ -14,19 +14,37 @@ so any number of extra vertices, at any difference in size, is found.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from solver.kernels import inline_kernel, kernel
-from solver.transport.field import RadiosityField
-from solver.types import BoolArray, Int64Array, IntArray, Points
+from solver.types import BoolArray, Corners, Int64Array, IntArray, Points
 
 _STRAIGHT: Final = 1e-6
 """Edges run against each other if the sine of their angle is at most this."""
 
 _HASH: Final = -7046029254386353131
 """2^64 over the golden ratio, odd, as a signed number: Fibonacci hashing."""
+
+
+class Leaves(Protocol):
+    """n polygons that tile patches, such as the leaves of a radiosity field; vertices are bit-identical."""
+
+    @property
+    def corners(self) -> Corners:
+        """(n, 4, 3) metres, counter-clockwise from the front; a triangle repeats its last corner"""
+        ...
+
+    @property
+    def corner_count(self) -> IntArray:
+        """(n,) 3 or 4"""
+        ...
+
+    @property
+    def patch(self) -> IntArray:
+        """(n,) index into the surfaces' patches"""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +69,17 @@ class Topology:
     """Edges on the border of their patch, ascending"""
 
 
-def connect(field: RadiosityField) -> Topology:
-    """The connections of the leaves of `field`."""
-    n = len(field.patch)
-    count = field.corner_count
+def connect(leaves: Leaves) -> Topology:
+    """The connections of `leaves`."""
+    n = len(leaves.patch)
+    count = leaves.corner_count
     # Adding 0 makes -0 into 0, which have different bits.
-    corners = np.ascontiguousarray(field.corners + 0.0)
+    corners = np.ascontiguousarray(leaves.corners + 0.0)
     vertex = np.empty((n, 4), dtype=np.int32)
     source = np.empty(4 * n, dtype=np.int32)
     table = np.full(_table_size(4 * n), -1, dtype=np.int32)
     bits = corners.view(np.int64)
-    v = _weld(bits, count, field.patch, vertex, source, table)
+    v = _weld(bits, count, leaves.patch, vertex, source, table)
     position = corners.reshape(-1, 3)[source[:v]]
     leaf_start, leaf_edge = np.zeros(v + 1, dtype=np.int32), np.empty(int(count.sum()), dtype=np.int32)
     end = np.empty(4 * n, dtype=np.int32)

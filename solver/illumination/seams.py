@@ -18,9 +18,8 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.topology import Leaves, Topology
 from solver.kernels import inline_kernel, kernel
-from solver.rendering.topology import Topology
-from solver.transport.field import RadiosityField
 from solver.types import BoolArray, Corners, FloatArray, Int64Array, IntArray, Points
 
 _STEP: Final = 1e-6
@@ -115,19 +114,37 @@ def _flatten(label: IntArray) -> None:
         label[i] = label[label[i]]
 
 
-def cut_borders(topology: Topology, field: RadiosityField, surfaces: Surfaces, lines: SeamLines) -> Seams:
-    """The vertices that the border edges of the leaves of `field` take in from other patches."""
+@dataclass(frozen=True, eq=False)
+class BorderEdges:
+    """The s border edges of leaves that lie on the common lines of several patches."""
+
+    edge: IntArray
+    """(s,) 4 l + k, ascending"""
+    line: IntArray
+    start: IntArray
+    """(s,) vertex of the topology"""
+    end: IntArray
+
+
+def edges_on_lines(topology: Topology, leaves: Leaves, surfaces: Surfaces, lines: SeamLines) -> BorderEdges:
+    """The border edges of `leaves` that other patches may meet."""
     border = topology.border
     leaf, slot = border >> 2, border & 3
-    patch = field.patch[leaf]
+    patch = leaves.patch[leaf]
     start = topology.vertex[leaf, slot]
-    end = topology.vertex[leaf, (slot + 1) % field.corner_count[leaf]]
+    end = topology.vertex[leaf, (slot + 1) % leaves.corner_count[leaf]]
     line = np.empty(len(border), dtype=np.int32)
     _find_line(
         patch, surfaces.corner_count, start, end, topology.position, surfaces.corners, lines.line, line
     )
     on_seam = line >= 0
-    border, line, start, end = border[on_seam], line[on_seam], start[on_seam], end[on_seam]
+    return BorderEdges(border[on_seam], line[on_seam], start[on_seam], end[on_seam])
+
+
+def cut_borders(topology: Topology, leaves: Leaves, surfaces: Surfaces, lines: SeamLines) -> Seams:
+    """The vertices that the border edges of `leaves` take in from other patches."""
+    found = edges_on_lines(topology, leaves, surfaces, lines)
+    border, line, start, end = found.edge, found.line, found.start, found.end
     # Sort all ends along their lines; t is measured from the first vertex to keep its digits.
     vertex = np.concatenate([start, end])
     both = np.concatenate([line, line])
