@@ -1,0 +1,158 @@
+"""Irradiance at points, from a radiosity solution: the exact yardstick of everything else ([H 6]).
+
+Every emitting patch counts whole, with its exact visible part. Reflected light comes over the links of the
+leaf on which a point lies, from elements as fine as their radiosity varies; for points off the surfaces,
+from all patches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver import tolerances
+from solver.geometry.surfaces import Surfaces
+from solver.illumination.light import Lamps, LinksByElement, Sources
+from solver.illumination.point_kernels import gather_anywhere, gather_on_surfaces
+from solver.parallel import run_chunks
+from solver.transport.elements import ElementTree
+from solver.transport.links import LinkTable
+from solver.transport.state import TransportState
+from solver.types import FloatArray, IntArray, Points, Spectra
+from solver.visibility.bvh import Hierarchy
+
+DEFAULT_ACCURACY: Final = 1e-3
+"""Share of the irradiance that one source may err by."""
+
+_ON_PLANE: Final = 1e-12
+"""A point is on a blocker's plane within this times the scene's size: rounding alone."""
+
+_ON_SURFACE: Final = 1e-7
+"""The same for points that a client gives, with fewer digits."""
+
+FEW_PATCHES: Final = 256
+"""With so many patches or fewer it is sooner done to ask all of them than to follow links."""
+
+_CHUNK: Final = 64
+
+
+@dataclass(frozen=True, eq=False)
+class PointIrradiance:
+    """What a solution brings to points; the solution must not be worked on meanwhile."""
+
+    surfaces: Surfaces
+    hierarchy: Hierarchy
+    accuracy: float
+    tree: ElementTree
+    links: LinkTable
+    by_element: LinksByElement | None
+    """None where all patches are asked"""
+    lamps: Lamps | None
+    light: Sources
+    """reflected light over links, all of it where all patches are asked"""
+    received: FloatArray
+    """(n, 3, channels) the solution's own irradiance functions"""
+    emission: Spectra
+    """(p, channels)"""
+    weights: FloatArray
+    """(channels,) of luminance"""
+
+    @staticmethod
+    def of(
+        state: TransportState,
+        hierarchy: Hierarchy,
+        accuracy: float = DEFAULT_ACCURACY,
+        few: int = FEW_PATCHES,
+    ) -> PointIrradiance:
+        """Of the light in `state`; `hierarchy` holds the patches that block.
+
+        `accuracy`: share of a point's irradiance that the treatment of one source may err by. Sources that
+        bring less than it are not clipped, and elements are entered until their nonlinear rest brings less.
+        Scenes of `few` patches or fewer do without links.
+        """
+        tree = state.tree
+        by_element = lamps = None
+        if tree.patch_count > few:
+            by_element = LinksByElement.of(state.links, len(tree))
+            lamps = Lamps.of(
+                state.surfaces, hierarchy, tree.corners, tree.corner_count, tree.patch, tree.leaves
+            )
+        return PointIrradiance(
+            surfaces=state.surfaces,
+            hierarchy=hierarchy,
+            accuracy=accuracy,
+            tree=tree,
+            links=state.links,
+            by_element=by_element,
+            lamps=lamps,
+            light=Sources.of(state, reflected_only=lamps is not None),
+            received=state.received,
+            emission=state.emission,
+            weights=state.weights,
+        )
+
+    def at(self, positions: Points, elements: IntArray) -> Spectra:
+        """Irradiance (n, channels) in W/m2 at positions (n, 3) on leaf `elements` (n,).
+
+        A point on an edge of a blocker should lie a little to the side from which it is meant [H 6.3].
+        """
+        normals = self.surfaces.normal[self.tree.patch[elements]]
+        if self.by_element is None or self.lamps is None:
+            return self.anywhere(positions, normals)
+        return self._over_links(self.by_element, self.lamps, positions, normals, elements)
+
+    def anywhere(self, positions: Points, normals: FloatArray) -> Spectra:
+        """Irradiance (n, channels) in W/m2 at points (n, 3) with unit normals (n, 3), on surfaces or off.
+
+        All patches are asked.
+        """
+        tree, light, h = self.tree, self.light, self.hierarchy
+        out = np.empty((len(positions), self.emission.shape[1]))
+        size = self.surfaces.size
+
+        def work(start: int, stop: int) -> None:
+            gather_anywhere(
+                positions, normals, self.accuracy, h.low, h.high, h.skip, h.first, h.count, h.order,
+                tree.patch_count, tree.child, tree.child_count, tree.corners, tree.corner_count, tree.patch,
+                tree.centroid, tree.axes, tree.patch_normal, light.functions, light.luminance, light.spread,
+                light.slope, light.extent, tolerances.SIDE * size, _ON_SURFACE * size, start, stop, out,
+            )  # fmt: skip
+
+        run_chunks(work, len(positions), _CHUNK, 1)
+        return out
+
+    def _over_links(
+        self,
+        by_element: LinksByElement,
+        lamps: Lamps,
+        positions: Points,
+        normals: FloatArray,
+        elements: IntArray,
+    ) -> Spectra:
+        tree, links, light = self.tree, self.links, self.light
+        out = np.empty((len(positions), self.emission.shape[1]))
+        expected = np.maximum(self.solved(positions, elements) @ self.weights, 0.0)
+        most = max(int(links.blocker_count.max(initial=0)), int(lamps.blocker_count.max(initial=0)))
+
+        def work(start: int, stop: int) -> None:
+            gather_on_surfaces(
+                positions, normals, elements, expected, self.accuracy, tree.parent, by_element.first,
+                by_element.link, by_element.other, links.kind, links.visibility,
+                links.blocker_start, links.blocker_count, links.pool, lamps.first, lamps.patch, lamps.kind,
+                lamps.blocker_start, lamps.blocker_count, lamps.pool, self.emission, tree.child,
+                tree.child_count, tree.corners, tree.corner_count, tree.patch, tree.centroid, tree.axes,
+                tree.patch_normal, light.functions, light.luminance, light.spread, light.slope,
+                light.extent, most,                 _ON_PLANE * self.surfaces.size, start, stop, out,
+            )  # fmt: skip
+
+        run_chunks(work, len(positions), _CHUNK, 1)
+        return out
+
+    def solved(self, positions: Points, elements: IntArray) -> Spectra:
+        """Irradiance (n, channels) at points on leaves by the solution's own linear functions."""
+        tree = self.tree
+        place = np.einsum("nka,na->nk", tree.axes[tree.patch[elements]], positions - tree.centroid[elements])
+        functions = self.received[elements]
+        return np.asarray(functions[:, 0] + np.einsum("nk,nkc->nc", place, functions[:, 1:]))
