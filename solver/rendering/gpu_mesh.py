@@ -1,16 +1,24 @@
 """A mesh in buffers of an OpenGL context.
 
-Buffers are filled when a pass first asks for them and live until `release`.
+Buffers are filled when a pass first asks for them and live until `release`. Each remembers the arrays that
+it was filled from: when another mesh is held, a buffer is filled anew only if its arrays are others. Meshes
+that share positions and triangles, and differ in what light falls on them, cost what differs.
+Arrays are taken as the same if they are the same object: nobody writes into an array of a mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import moderngl
 import numpy as np
 
+from solver.errors import LimitExceededError
+from solver.rendering.device import GlDevice
+from solver.rendering.entry_points import Texel
+from solver.rendering.meshes import DrawnMesh, leaf_radiance, local_positions
 from solver.rendering.projection import facings
 from solver.rendering.tessellation import RenderMesh
 from solver.types import AnyArray, Vector
@@ -18,33 +26,95 @@ from solver.types import AnyArray, Vector
 _SMALLEST: Final = 16
 """Bytes of an empty array's buffer: OpenGL has no buffers of 0."""
 
+_TEXEL_BYTES: Final = 16
+
+
+@dataclass(eq=False)
+class _Kept:
+    """A buffer, and how shaders are given it as texels."""
+
+    buffer: moderngl.Buffer
+    sources: tuple[object, ...]
+    """What it was filled from"""
+    texels: int | None = None
+
 
 class GpuMesh:
-    """Buffers of one `RenderMesh`, and the vertex arrays that passes have made of them."""
+    """Buffers of the mesh that is held, and the vertex arrays that passes have made of them."""
 
-    def __init__(self, context: moderngl.Context, mesh: RenderMesh) -> None:
+    def __init__(self, device: GlDevice, mesh: DrawnMesh) -> None:
         self.mesh = mesh
-        self._context = context
-        self._buffers: dict[str, moderngl.Buffer] = {}
-        self._vertex_arrays: dict[object, moderngl.VertexArray] = {}
+        self.uploaded = 0
+        """Bytes written to the device so far"""
+        self._context = device.context
+        self._calls = device.entry_points
+        self._kept: dict[str, _Kept] = {}
+        self._vertex_arrays: dict[tuple[object, ...], moderngl.VertexArray] = {}
         self._eye: Vector | None = None
 
-    def buffer(self, name: str, array: AnyArray) -> moderngl.Buffer:
-        """The buffer of that name; filled with `array` when first asked for."""
-        if name not in self._buffers:
-            data = np.ascontiguousarray(array)
-            self._buffers[name] = self._context.buffer(data if data.size else bytes(_SMALLEST))
-        return self._buffers[name]
+    def hold(self, mesh: DrawnMesh) -> None:
+        """Be the buffers of `mesh` from now on."""
+        if mesh.surfaces is not self.mesh.surfaces:
+            self.release()
+        self.mesh = mesh
 
-    def vertex_array(self, key: object, make: Callable[[], moderngl.VertexArray]) -> moderngl.VertexArray:
-        """The vertex array under `key`; made when first asked for."""
+    def buffer(self, name: str, array: AnyArray) -> moderngl.Buffer:
+        """The buffer of that name, with `array` in it."""
+        return self.derived(name, (array,), lambda: array).buffer
+
+    def derived(self, name: str, sources: tuple[object, ...], make: Callable[[], AnyArray]) -> _Kept:
+        """The buffer of that name, with what `make` makes of `sources` in it."""
+        kept = self._kept.get(name)
+        if kept is not None and _are_same(kept.sources, sources):
+            return kept
+        data = np.ascontiguousarray(make())
+        self.uploaded += data.nbytes
+        if kept is not None and kept.buffer.size == data.nbytes:
+            kept.buffer.write(data)
+            kept.sources = sources
+            return kept
+        if kept is not None:
+            self._release_vertex_arrays()
+            self._release(kept)
+        made = self._context.buffer(data if data.size else bytes(_SMALLEST))
+        self._kept[name] = _Kept(made, sources)
+        return self._kept[name]
+
+    def use_texels(
+        self,
+        unit: int,
+        texel: Texel,
+        name: str,
+        sources: tuple[object, ...],
+        make: Callable[[], AnyArray],
+    ) -> None:
+        """As `derived`, given to shaders as texels at `unit`. Raises LimitExceededError for too many."""
+        kept = self.derived(name, sources, make)
+        if kept.texels is None:
+            if kept.buffer.size > _TEXEL_BYTES * self._calls.most_texels:
+                raise LimitExceededError(
+                    f"texels of {name}", kept.buffer.size // _TEXEL_BYTES, self._calls.most_texels
+                )
+            kept.texels = self._calls.make_texels(kept.buffer, texel, unit)
+        else:
+            self._calls.use_texels(kept.texels, unit)
+
+    def vertex_array(
+        self, program: moderngl.Program, *extra: tuple[moderngl.Buffer, str, str]
+    ) -> moderngl.VertexArray:
+        """The mesh's vertices for `program`, with positions, patches, and `extra` buffers as attributes."""
+        attributes = [(self.positions(), "3f", "position"), (self.patches(), "i", "patch_index"), *extra]
+        index = self.triangles()
+        key = (program, *(buffer for buffer, _, _ in attributes))
         if key not in self._vertex_arrays:
-            self._vertex_arrays[key] = make()
+            self._vertex_arrays[key] = self._context.vertex_array(program, attributes, index_buffer=index)
         return self._vertex_arrays[key]
 
     def positions(self) -> moderngl.Buffer:
         """Local coordinates, three float32 a vertex."""
-        return self.buffer("position", self.mesh.position)
+        mesh = self.mesh
+        sources = (mesh.position, mesh.surfaces)
+        return self.derived("position", sources, lambda: local_positions(mesh).astype(np.float32)).buffer
 
     def patches(self) -> moderngl.Buffer:
         """Patches of vertices, int32."""
@@ -54,20 +124,45 @@ class GpuMesh:
         """Vertices of triangles, three int32 each."""
         return self.buffer("triangles", self.mesh.triangles)
 
+    def leaf_values(self, is_radiance: bool) -> moderngl.Buffer:
+        """Radiance or irradiance of leaves, three float32 each."""
+        mesh = self.mesh
+        name = f"leaf {'radiance' if is_radiance else 'irradiance'}"
+        if isinstance(mesh, RenderMesh):
+            return self.buffer(name, mesh.leaf_radiance if is_radiance else mesh.leaf_irradiance)
+        sources = (mesh.leaf_irradiance, mesh.leaf, mesh.triangles, mesh.patch, mesh.surfaces)
+        return self.derived(
+            name,
+            sources,
+            lambda: (leaf_radiance(mesh) if is_radiance else mesh.leaf_irradiance).astype(np.float32),
+        ).buffer
+
     def facings(self, eye: Vector) -> moderngl.Buffer:
         """Facings of patches seen from `eye` (3,) in metres, int32."""
-        found = facings(self.mesh.surfaces, eye)
-        kept = self.buffer("facings", found)
-        if found.size and (self._eye is None or not np.array_equal(self._eye, eye)):
-            kept.write(found)
-        self._eye = eye.copy()
-        return kept
+        surfaces = self.mesh.surfaces
+        if self._eye is None or not np.array_equal(self._eye, eye):
+            self._eye = eye.copy()
+        # The copy stands for the eye: it is another object only where the eye is another.
+        return self.derived("facings", (surfaces, self._eye), lambda: facings(surfaces, eye)).buffer
 
     def release(self) -> None:
         """Give all back; the context must be current."""
+        self._release_vertex_arrays()
+        for kept in self._kept.values():
+            self._release(kept)
+        self._kept.clear()
+
+    def _release(self, kept: _Kept) -> None:
+        if kept.texels is not None:
+            self._calls.release_texels(kept.texels)
+        kept.buffer.release()
+
+    def _release_vertex_arrays(self) -> None:
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
-        for buffer in self._buffers.values():
-            buffer.release()
         self._vertex_arrays.clear()
-        self._buffers.clear()
+
+
+def _are_same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:
+    """Whether these are the same objects."""
+    return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from solver.rendering.false_colour import scale_maximum
 from solver.rendering.tone_mapping import ToneCurve, encode_srgb, tone_map
 from solver.types import AnyArray, ByteArray, Float32Array, FloatArray
 
@@ -15,9 +16,6 @@ _HASH: Final = np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)
 
 _DARKEST: Final = 40
 """Hashed colours stay away from black, which is nothing."""
-
-_WHITE: Final = 0.995
-"""This part of the pixels that show anything is not brighter than white."""
 
 
 class Layer(StrEnum):
@@ -39,24 +37,34 @@ class Layer(StrEnum):
     """Index into `surfaces.object_ids`"""
     ELEMENT = "element"
     """Index of the leaf"""
+    TRIANGLE = "triangle"
+    """Index of the mesh's triangle"""
+    BARYCENTRIC = "barycentric"
+    """Weights of the triangle's three corners"""
+    ERROR = "error"
+    """Estimated RMS error of the luminance of the irradiance over the triangle, W/m2"""
+    FALSE_COLOUR = "false_colour"
+    """Illuminance as sRGB colours in 0..1, by `false_colour`"""
 
 
 def picture_of(image: AnyArray, layer: Layer) -> ByteArray:
     """`image`, a frame of `layer`, as an sRGB picture, uint8 (h, w, 3).
 
     - radiance, irradiance: tone-mapped, automatic exposure, linear curve;
-    - illuminance: grey, white at the 99.5th percentile of what is lit;
+    - illuminance, error: grey, white at the 99.5th percentile of what is more than 0;
     - depth: grey, white at the nearest, dark at the farthest, black where nothing is seen;
     - position: red, green, blue over the extent of x, y, z in view, black where nothing is seen;
     - normal: (n + 1) / 2, black where nothing is seen;
-    - object, element: a colour for each number, black where nothing is seen.
+    - object, element, triangle: a colour for each number, black where nothing is seen;
+    - barycentric: red, green, blue for the three corners, black where nothing is seen;
+    - false_colour: as it is.
 
-    Depth, position and normal are data, not light: they are not sRGB-encoded.
+    Depth, position, normal and barycentric are data, not light: they are not sRGB-encoded.
     """
     match layer:
         case Layer.RADIANCE | Layer.IRRADIANCE:
             return tone_map(image, None, ToneCurve.LINEAR)
-        case Layer.ILLUMINANCE:
+        case Layer.ILLUMINANCE | Layer.ERROR:
             return _grey(_scaled_light(image))
         case Layer.DEPTH:
             return _grey(_scaled_depth(image))
@@ -65,8 +73,10 @@ def picture_of(image: AnyArray, layer: Layer) -> ByteArray:
         case Layer.NORMAL:
             seen = np.any(image != 0.0, axis=-1, keepdims=True)
             return _bytes(np.where(seen, (image + 1.0) / 2.0, 0.0))
-        case Layer.OBJECT | Layer.ELEMENT:
+        case Layer.OBJECT | Layer.ELEMENT | Layer.TRIANGLE:
             return _hashed_colours(image)
+        case Layer.BARYCENTRIC | Layer.FALSE_COLOUR:
+            return _bytes(image)
 
 
 def _grey(values: ByteArray) -> ByteArray:
@@ -78,9 +88,7 @@ def _bytes(values: FloatArray) -> ByteArray:
 
 
 def _scaled_light(light: Float32Array) -> ByteArray:
-    lit = light[np.isfinite(light) & (light > 0.0)]
-    white = float(np.quantile(lit, _WHITE)) if lit.size else 1.0
-    return encode_srgb(light / np.float32(white))
+    return encode_srgb(light / np.float32(scale_maximum(light)))
 
 
 def _scaled_depth(depth: Float32Array) -> ByteArray:

@@ -18,6 +18,9 @@ _FACINGS: Final = 0
 _LEAVES: Final = 1
 _VALUES: Final = 2
 
+BACK: Final = np.uint32(1 << 31)
+"""Marks a black back in a target of identities."""
+
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
@@ -63,17 +66,6 @@ class _MeshPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
 
-    def _geometry(self, scene: GpuMesh) -> moderngl.VertexArray:
-        """Positions and patches alone."""
-        return scene.vertex_array(
-            self,
-            lambda: self._context.vertex_array(
-                self._program,
-                [(scene.positions(), "3f", "position"), (scene.patches(), "i", "patch_index")],
-                index_buffer=scene.triangles(),
-            ),
-        )
-
     def release(self) -> None:
         """Give the program back; the context must be current."""
         self._program.release()
@@ -89,42 +81,30 @@ class GouraudPass(_MeshPass):
         self, scene: GpuMesh, viewpoint: Viewpoint, target: Target, name: str, values: Float32Array
     ) -> None:
         """Draw `values`, which the mesh's buffers keep under `name`."""
-
-        def make() -> moderngl.VertexArray:
-            return self._context.vertex_array(
-                self._program,
-                [
-                    (scene.positions(), "3f", "position"),
-                    (scene.patches(), "i", "patch_index"),
-                    (scene.buffer(name, values), "3f", "value"),
-                ],
-                index_buffer=scene.triangles(),
-            )
-
         self._look(scene, viewpoint)
+        vertices = scene.vertex_array(self._program, (scene.buffer(name, values), "3f", "value"))
         self._clear(target)
-        scene.vertex_array((self, name), make).render()
+        vertices.render()
 
 
 class FlatPass(_MeshPass):
-    """Values of leaves (n, 3), constant over them."""
+    """Means of leaves, constant over them."""
 
     def __init__(self, context: moderngl.Context) -> None:
         super().__init__(context, "triangle.vert", "flat.frag")
 
-    def draw(
-        self, scene: GpuMesh, viewpoint: Viewpoint, target: Target, name: str, values: Float32Array
-    ) -> None:
-        """Draw `values`, which the mesh's buffers keep under `name`."""
+    def draw(self, scene: GpuMesh, viewpoint: Viewpoint, target: Target, is_radiance: bool) -> None:
+        """Draw radiance or irradiance."""
         self._look(scene, viewpoint)
         scene.buffer("leaf", scene.mesh.leaf).bind_to_storage_buffer(_LEAVES)
-        scene.buffer(name, values).bind_to_storage_buffer(_VALUES)
+        scene.leaf_values(is_radiance).bind_to_storage_buffer(_VALUES)
+        vertices = scene.vertex_array(self._program)
         self._clear(target)
-        self._geometry(scene).render()
+        vertices.render()
 
 
 class IdentityPass(_MeshPass):
-    """One more than the number of the triangle that a pixel shows; 0 where it shows none."""
+    """One more than the number of the triangle that a pixel shows, and `BACK` for a back; 0 for nothing."""
 
     def __init__(self, context: moderngl.Context) -> None:
         super().__init__(context, "triangle.vert", "identity.frag")
@@ -132,8 +112,9 @@ class IdentityPass(_MeshPass):
     def draw(self, scene: GpuMesh, viewpoint: Viewpoint, target: Target) -> None:
         """Draw into a target of identities."""
         self._look(scene, viewpoint)
+        vertices = scene.vertex_array(self._program)
         self._clear(target)
-        self._geometry(scene).render()
+        vertices.render()
 
 
 class AccumulationPass:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,17 @@ BACK: Final = 1
 """The black back of a one-sided patch"""
 HIDDEN: Final = 2
 """The back of a patch of a two-sided face, which has a patch of its own there"""
+
+
+class PixelRays(NamedTuple):
+    """Rays through pixels, 1 long along the viewing direction; an arrays' tuple, as kernels take it."""
+
+    first: Vector
+    """(3,) through the centre of the first pixel"""
+    across: Vector
+    """(3,) what a pixel further to the right adds"""
+    down: Vector
+    """(3,) what a pixel further down adds"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +54,18 @@ class Projection:
         return Projection(
             (camera.eye - surfaces.center) / surfaces.size, right / across, -up / upwards, forward
         )
+
+    def rays(self, size: tuple[int, int], jitter: tuple[float, float] = (0.0, 0.0)) -> PixelRays:
+        """Rays through pixels of a frame of `size` (width, height).
+
+        `jitter` is how far right and down the picture has been moved against them, in clip space.
+        """
+        right = self.right / (self.right @ self.right)
+        down = self.down / (self.down @ self.down)
+        across_pixel, down_pixel = 2.0 / size[0], 2.0 / size[1]
+        x = 0.5 * across_pixel - 1.0 - jitter[0]
+        y = 0.5 * down_pixel - 1.0 - jitter[1]
+        return PixelRays(self.forward + x * right + y * down, across_pixel * right, down_pixel * down)
 
 
 def half_extents(camera: Camera) -> tuple[float, float]:

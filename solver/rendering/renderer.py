@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
+from typing import TypeAlias
 
 import numpy as np
 
+from solver.errors import SceneError
 from solver.geometry.scene import Camera
+from solver.illumination.mesh import InterpolantMesh
 from solver.rendering import geometry_layers
 from solver.rendering.device import GlDevice
+from solver.rendering.false_colour import false_colour
 from solver.rendering.gpu_mesh import GpuMesh
+from solver.rendering.interpolant_pass import InterpolantPass
 from solver.rendering.layers import Layer
-from solver.rendering.passes import AccumulationPass, FlatPass, GouraudPass, IdentityPass, Viewpoint
+from solver.rendering.meshes import DrawnMesh, NotInMeshError
+from solver.rendering.passes import BACK, AccumulationPass, FlatPass, GouraudPass, IdentityPass, Viewpoint
+from solver.rendering.picking import Pick
 from solver.rendering.projection import Projection, pixel_pattern
 from solver.rendering.targets import Pixel, Target, Targets, require_drawable
-from solver.rendering.tessellation import RenderMesh
-from solver.types import LUMINANCE_WEIGHTS, AnyArray, Float32Array, IntArray
+from solver.types import LUMINANCE_WEIGHTS, AnyArray, BoolArray, Float32Array, IntArray
 
-__all__ = ["FrameRenderer", "Layer", "Shading"]
+__all__ = ["FrameRenderer", "Layer", "Shading", "needs_interpolants"]
 
 
 class Shading(StrEnum):
@@ -26,7 +33,19 @@ class Shading(StrEnum):
     FLAT = "flat"
     """Not at all: each leaf has its mean"""
     GOURAUD = "gouraud"
-    """Linearly over triangles, from values at the corners of leaves"""
+    """Linearly over triangles, from values at the corners of leaves; over a mesh of interpolants from those
+    of each triangle's own, so that it breaks where light does ([H B.3.2])"""
+    INTERPOLANT = "interpolant"
+    """Quadratically over triangles ([H 3.4])"""
+
+
+def needs_interpolants(shading: Shading, layer: Layer) -> bool:
+    """Whether only a mesh of interpolants has such a frame."""
+    return shading is Shading.INTERPOLANT or layer is Layer.ERROR
+
+
+_Painter: TypeAlias = Callable[[Viewpoint, Target], None]
+"""Draws what a viewpoint sees into a target of colours."""
 
 
 class FrameRenderer:
@@ -39,39 +58,77 @@ class FrameRenderer:
             self._gouraud = GouraudPass(context)
             self._flat = FlatPass(context)
             self._identity = IdentityPass(context)
+            self._interpolant = InterpolantPass(context)
             self._accumulation = AccumulationPass(context)
         self._targets = Targets(device)
         self._scene: GpuMesh | None = None
 
+    @property
+    def uploaded(self) -> int:
+        """Bytes of meshes written to the device so far."""
+        return 0 if self._scene is None else self._scene.uploaded
+
     def draw(
-        self, mesh: RenderMesh, camera: Camera, shading: Shading, layer: Layer, samples: int = 1
+        self, mesh: DrawnMesh, camera: Camera, shading: Shading, layer: Layer, samples: int = 1
     ) -> AnyArray:
         """A frame of `mesh` seen by `camera`, top row first.
 
         radiance (h, w, 3) float32 W/(m2 sr), irradiance (h, w, 3) float32 and illuminance (h, w) float32
         W/m2: 0 where nothing is seen or only the black back of a face, the mean of `samples` points of each
-        pixel. The other layers take the pixel's centre: depth (h, w) float32 metres along the viewing
-        direction, infinite where nothing is seen; position (h, w, 3) float64 metres, NaN; normal (h, w, 3)
-        float32, 0; object (h, w) int32 and element (h, w) int32, -1. Backs have the normal of their front.
+        pixel; false_colour (h, w, 3) float32 sRGB shows this illuminance on a scale of its own. The other
+        layers take the pixel's centre: depth (h, w) float32 metres along the viewing direction, infinite
+        where nothing is seen; position (h, w, 3) float64 metres, NaN; normal (h, w, 3) float32, 0; object,
+        element and triangle (h, w) int32, -1; barycentric (h, w, 3) float32, 0; error (h, w) float32 W/m2, 0.
+        Backs have the normal of their front, and no error.
 
-        The mesh stays on the device for as long as the same object is drawn. Raises LimitExceededError or
-        SceneError naming width, height or samples, DeviceUseError, and MemoryError.
+        What is uploaded stays on the device for as long as the same arrays are drawn. Raises NotInMeshError,
+        LimitExceededError or SceneError naming width, height or samples, DeviceUseError, and MemoryError.
         """
         require_drawable(camera, samples, self._device)
-        with self._device.current() as context:
-            self._device.entry_points.keep_depth()
-            if self._scene is None or self._scene.mesh is not mesh:
-                if self._scene is not None:
-                    self._scene.release()
-                self._scene = GpuMesh(context, mesh)
+        if needs_interpolants(shading, layer) and not isinstance(mesh, InterpolantMesh):
+            raise NotInMeshError(layer if layer is Layer.ERROR else shading)
+        with self._device.current():
+            scene = self._hold(mesh)
             match layer:
                 case Layer.RADIANCE | Layer.IRRADIANCE:
-                    return self._draw_light(self._scene, camera, shading, layer, samples)
-                case Layer.ILLUMINANCE:
-                    irradiance = self._draw_light(self._scene, camera, shading, Layer.IRRADIANCE, samples)
-                    return irradiance @ LUMINANCE_WEIGHTS.astype(np.float32)
-                case Layer.DEPTH | Layer.POSITION | Layer.NORMAL | Layer.OBJECT | Layer.ELEMENT:
-                    return _geometry(self._draw_identity(self._scene, camera), mesh, camera, layer)
+                    return self._draw_light(scene, camera, shading, layer, samples)
+                case Layer.ILLUMINANCE | Layer.FALSE_COLOUR:
+                    irradiance = self._draw_light(scene, camera, shading, Layer.IRRADIANCE, samples)
+                    illuminance = irradiance @ LUMINANCE_WEIGHTS.astype(np.float32)
+                    return illuminance if layer is Layer.ILLUMINANCE else false_colour(illuminance)
+                case Layer.ERROR if isinstance(mesh, InterpolantMesh):
+                    shown, is_back = self._draw_identity(scene, camera)
+                    return geometry_layers.errors(np.where(is_back, np.int32(-1), shown), mesh)
+                case _:
+                    shown, _ = self._draw_identity(scene, camera)
+                    return _geometry(shown, mesh, camera, layer)
+
+    def pick(self, mesh: DrawnMesh, camera: Camera, x: int, y: int) -> Pick | None:
+        """What the pixel in column `x` and row `y` shows, both counted from the top left; None for nothing.
+
+        Raises SceneError naming x or y for a pixel outside the frame, and as `draw`.
+        """
+        require_drawable(camera, 1, self._device)
+        for name, at, length in (("x", x, camera.width), ("y", y, camera.height)):
+            if not 0 <= at < length:
+                raise SceneError(f"a pixel of this frame is in 0 to {length - 1}", (name,))
+        with self._device.current():
+            shown, _ = self._draw_identity(self._hold(mesh), camera, (x, y, 1, 1))
+        triangle = int(shown[0, 0])
+        if triangle < 0:
+            return None
+        surfaces = mesh.surfaces
+        patch = int(geometry_layers.patches(shown, mesh)[0, 0])
+        return Pick(
+            triangle=triangle,
+            barycentric=geometry_layers.barycentrics(shown, mesh, camera, (y, x))[0, 0],
+            position=geometry_layers.positions(shown, mesh, camera, (y, x))[0, 0],
+            normal=surfaces.normal[patch].copy(),
+            patch=patch,
+            face=int(surfaces.face[patch]),
+            object_id=surfaces.object_ids[surfaces.object[patch]],
+            leaf=int(mesh.leaf[triangle]),
+        )
 
     def release(self) -> None:
         """Give back all that it holds of the device. Raises DeviceUseError."""
@@ -80,57 +137,87 @@ class FrameRenderer:
             if self._scene is not None:
                 self._scene.release()
                 self._scene = None
-            for made in (self._gouraud, self._flat, self._identity, self._accumulation):
+            for made in (self._gouraud, self._flat, self._identity, self._interpolant, self._accumulation):
                 made.release()
+
+    def _hold(self, mesh: DrawnMesh) -> GpuMesh:
+        self._device.entry_points.keep_depth()
+        if self._scene is None:
+            self._scene = GpuMesh(self._device, mesh)
+        elif self._scene.mesh is not mesh:
+            self._scene.hold(mesh)
+        return self._scene
 
     def _draw_light(
         self, scene: GpuMesh, camera: Camera, shading: Shading, layer: Layer, samples: int
     ) -> Float32Array:
-        mesh = scene.mesh
-        is_radiance = layer is Layer.RADIANCE
-        painter: FlatPass | GouraudPass
-        if shading is Shading.FLAT:
-            painter, name = self._flat, f"leaf {layer}"
-            values = mesh.leaf_radiance if is_radiance else mesh.leaf_irradiance
-        else:
-            painter, name = self._gouraud, f"vertex {layer}"
-            values = mesh.radiance if is_radiance else mesh.irradiance
+        paint = self._painter(scene, shading, layer)
         size = (camera.width, camera.height)
-        projection = Projection.of(camera, mesh.surfaces)
+        projection = Projection.of(camera, scene.mesh.surfaces)
         frame = self._targets.get(size, Pixel.COLOUR)
         if samples == 1:
-            painter.draw(scene, Viewpoint(camera.eye, projection), frame, name, values)
+            paint(Viewpoint(camera.eye, projection), frame)
             return _read_colours(frame)
         total = self._targets.get(size, Pixel.COLOUR, has_depth=False)
         total.framebuffer.clear()
         for right, down in pixel_pattern(samples).tolist():
             # The picture moves against the point that is sampled.
             jitter = (-2.0 * right / camera.width, -2.0 * down / camera.height)
-            painter.draw(scene, Viewpoint(camera.eye, projection, jitter), frame, name, values)
+            paint(Viewpoint(camera.eye, projection, jitter), frame)
             self._accumulation.add(frame, 1.0 / samples, total)
         return _read_colours(total)
 
-    def _draw_identity(self, scene: GpuMesh, camera: Camera) -> IntArray:
-        """Triangle that each pixel shows, (h, w), or -1."""
+    def _painter(self, scene: GpuMesh, shading: Shading, layer: Layer) -> _Painter:
+        mesh = scene.mesh
+        is_radiance = layer is Layer.RADIANCE
+        if shading is Shading.FLAT:
+            return lambda viewpoint, target: self._flat.draw(scene, viewpoint, target, is_radiance)
+        if isinstance(mesh, InterpolantMesh):
+
+            def paint(viewpoint: Viewpoint, target: Target) -> None:
+                identity = self._targets.get(target.size, Pixel.IDENTITY)
+                self._identity.draw(scene, viewpoint, identity)
+                self._interpolant.draw(
+                    scene, mesh, viewpoint, identity, target,
+                    is_linear=shading is Shading.GOURAUD, is_radiance=is_radiance,
+                )  # fmt: skip
+
+            return paint
+        name = f"vertex {layer}"
+        values = mesh.radiance if is_radiance else mesh.irradiance
+        return lambda viewpoint, target: self._gouraud.draw(scene, viewpoint, target, name, values)
+
+    def _draw_identity(
+        self, scene: GpuMesh, camera: Camera, piece: tuple[int, int, int, int] | None = None
+    ) -> tuple[IntArray, BoolArray]:
+        """Triangle that each pixel shows, (h, w), or -1, and whether its back.
+
+        Of the whole frame, or of the `piece` from a column and a row on, so many wide and high.
+        """
         target = self._targets.get((camera.width, camera.height), Pixel.IDENTITY)
         self._identity.draw(scene, Viewpoint(camera.eye, Projection.of(camera, scene.mesh.surfaces)), target)
-        shown = np.empty((camera.height, camera.width), dtype=np.uint32)
-        target.framebuffer.read_into(shown, components=1, dtype=Pixel.IDENTITY.value, alignment=4)
-        return (shown - np.uint32(1)).view(np.int32)
+        window = piece or (0, 0, camera.width, camera.height)
+        shown = np.empty((window[3], window[2]), dtype=np.uint32)
+        target.framebuffer.read_into(shown, window, 1, dtype=Pixel.IDENTITY.value, alignment=4)
+        return ((shown & ~BACK) - np.uint32(1)).view(np.int32), (shown & BACK) != 0
 
 
-def _geometry(identity: IntArray, mesh: RenderMesh, camera: Camera, layer: Layer) -> AnyArray:
+def _geometry(shown: IntArray, mesh: DrawnMesh, camera: Camera, layer: Layer) -> AnyArray:
     match layer:
         case Layer.DEPTH:
-            return geometry_layers.depths(identity, mesh, camera).astype(np.float32)
+            return geometry_layers.depths(shown, mesh, camera).astype(np.float32)
         case Layer.POSITION:
-            return geometry_layers.positions(identity, mesh, camera)
+            return geometry_layers.positions(shown, mesh, camera)
         case Layer.NORMAL:
-            return geometry_layers.normals(identity, mesh)
+            return geometry_layers.normals(shown, mesh)
+        case Layer.BARYCENTRIC:
+            return geometry_layers.barycentrics(shown, mesh, camera).astype(np.float32)
         case Layer.OBJECT:
-            return geometry_layers.object_ids(identity, mesh)
+            return geometry_layers.object_ids(shown, mesh)
+        case Layer.ELEMENT:
+            return geometry_layers.leaf_ids(shown, mesh)
         case _:
-            return geometry_layers.leaf_ids(identity, mesh)
+            return shown
 
 
 def _read_colours(target: Target) -> Float32Array:

@@ -28,6 +28,8 @@ class Target:
         self.size = size
         self.channels = 4 if pixel is Pixel.COLOUR else 1
         self.texture = context.texture(size, self.channels, dtype=pixel.value)
+        # Integers cannot be interpolated: with the default filter shaders read 0.
+        self.texture.filter = moderngl.NEAREST, moderngl.NEAREST
         self._depth: moderngl.Renderbuffer | None = None
         if has_depth:
             self._depth = context.depth_renderbuffer(size)

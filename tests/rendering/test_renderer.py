@@ -144,7 +144,7 @@ def test_top_row_comes_first_and_left_is_left(renderer: FrameRenderer) -> None:
     assert shown[24, 34] == shown[36, 46] == -1
 
 
-@pytest.mark.parametrize("shading", Shading)
+@pytest.mark.parametrize("shading", [Shading.FLAT, Shading.GOURAUD])
 def test_one_sided_backs_are_black_and_hide(shading: Shading, renderer: FrameRenderer) -> None:
     lamp = [(-9.0, -9.0, 2.0), (-9.0, 9.0, 2.0), (9.0, 9.0, 2.0), (9.0, -9.0, 2.0)]
     surfaces = surfaces_of(
@@ -158,7 +158,7 @@ def test_one_sided_backs_are_black_and_hide(shading: Shading, renderer: FrameRen
     np.testing.assert_allclose(frame[shown == 1], 5.0 / np.pi, rtol=1e-6)
 
 
-@pytest.mark.parametrize("shading", Shading)
+@pytest.mark.parametrize("shading", [Shading.FLAT, Shading.GOURAUD])
 def test_two_sided_faces_show_the_side_that_is_looked_at(shading: Shading, renderer: FrameRenderer) -> None:
     surfaces = surfaces_of(polygons(SQUARE, two_sided=True, reflectance=0.5))
     field = build_field(surfaces, uneven(4, 4))
@@ -227,12 +227,13 @@ def test_frames_follow_the_mesh_and_the_camera(renderer: FrameRenderer) -> None:
     np.testing.assert_allclose(values, [1.0, 1.0, 2.0, 2.0, 1.0, 1.0], rtol=1e-6)
 
 
-@pytest.mark.parametrize("layer", Layer)
+@pytest.mark.parametrize("layer", sorted(set(Layer) - {Layer.ERROR}))
 def test_empty_scenes_give_empty_frames(layer: Layer, renderer: FrameRenderer) -> None:
     surfaces = flatten(Scene({}))
     mesh = Tessellator(surfaces).mesh(build_empty(surfaces))
     frame = renderer.draw(mesh, LOOK_DOWN, Shading.GOURAUD, layer)
-    nothing = {Layer.DEPTH: np.inf, Layer.POSITION: np.nan, Layer.OBJECT: -1, Layer.ELEMENT: -1}.get(layer, 0)
+    numbers = dict.fromkeys((Layer.OBJECT, Layer.ELEMENT, Layer.TRIANGLE), -1)
+    nothing = {Layer.DEPTH: np.inf, Layer.POSITION: np.nan, **numbers}.get(layer, 0)
     assert frame.shape[:2] == (60, 80)
     np.testing.assert_array_equal(frame, np.full_like(frame, nothing))
 
