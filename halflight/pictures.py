@@ -11,8 +11,8 @@ from solver.engine.requests import FrameRequest
 from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.geometry.scene import Scene
+from solver.illumination.settings import LightSettings
 from solver.pathtracing import PathTracer
-from solver.transport.settings import SolverSettings
 from solver.types import AnyArray
 
 SAMPLES_PER_PASS: Final = 4
@@ -56,7 +56,7 @@ class RadiosityPicture:
 
     def __init__(self, scene: Scene, request: FrameRequest, tolerance: float, drawing: Drawing) -> None:
         """Raises SceneError, NotAvailableError, RenderingUnavailableError where it could not be drawn."""
-        self._engine = Engine(scene, SolverSettings(error_tolerance=tolerance), _UNLIMITED, drawing)
+        self._engine = Engine(scene, LightSettings(error_tolerance=tolerance), _UNLIMITED, drawing)
         self._request = request
         self._engine.outlook(request)
 

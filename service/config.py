@@ -11,7 +11,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from solver.document.limits import SceneLimits
 from solver.engine.requests import FrameLimits
 from solver.errors import LimitExceededError
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 
 _Count: TypeAlias = Annotated[int, Field(ge=1)]
 
@@ -75,16 +75,16 @@ class ServiceSettings(BaseSettings):
         )
 
     @property
-    def solver_defaults(self) -> SolverSettings:
+    def solver_defaults(self) -> LightSettings:
         """Solver settings of a session that gives none, within the limits."""
-        defaults = SolverSettings()
+        defaults = LightSettings()
         return replace(
             defaults,
             max_elements=min(defaults.max_elements, self.max_elements),
             max_links=min(defaults.max_links, self.max_links),
         )
 
-    def check_solver(self, settings: SolverSettings) -> None:
+    def check_solver(self, settings: LightSettings) -> None:
         """Raise LimitExceededError where a client's solver settings ask for too much."""
         if settings.max_elements > self.max_elements:
             raise LimitExceededError("max_elements", settings.max_elements, self.max_elements)

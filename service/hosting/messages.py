@@ -18,7 +18,7 @@ from solver.engine.requests import Encoding, FrameLimits, FrameRequest, Wait
 from solver.engine.status import Change, EngineStatus, ProbeResult
 from solver.engine.views import Outlook
 from solver.geometry.scene import Scene
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 from solver.types import FloatArray, Points
 
 R = TypeVar("R")
@@ -36,7 +36,7 @@ class Open(Request[EngineStatus]):
     """Make the worker's engine. Its first request."""
 
     scene: Scene
-    settings: SolverSettings
+    settings: LightSettings
     limits: SceneLimits
     frame_limits: FrameLimits
 

@@ -8,9 +8,9 @@ from typing import Annotated, TypeAlias
 from pydantic import Field
 
 from solver.document.fields import Closed
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 
-_DEFAULTS = SolverSettings()
+_DEFAULTS = LightSettings()
 
 _Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
 _Count: TypeAlias = Annotated[int, Field(strict=True, ge=1, lt=2**31)]
@@ -45,11 +45,32 @@ class SettingsDocument(Closed):
         default=_DEFAULTS.max_links, description="Links after which refinement stops, with a warning."
     )
 
-    def changes_to(self, settings: SolverSettings) -> SolverSettings:
+    interpolation_error: Annotated[_Positive, Field(le=1.0)] | None = Field(
+        default=None,
+        description="Relative RMS error that interpolants may add to the solution's, over what is in view.",
+    )
+    point_accuracy: Annotated[_Positive, Field(le=1.0)] = Field(
+        default=_DEFAULTS.point_accuracy,
+        description="Share of a point's irradiance that the treatment of one source may err by.",
+    )
+    max_leaf_discontinuities: Annotated[int, Field(strict=True, ge=0, le=1000)] = Field(
+        default=_DEFAULTS.max_leaf_discontinuities,
+        description="Most lines of discontinuities that cut one leaf of the mesh.",
+    )
+    minimum_discontinuity_weight: Annotated[_Positive, Field(le=1e12)] | None = Field(
+        default=None,
+        description="A discontinuity is meshed if without it an interpolant would be wrong by this much, "
+        "W/m2 of luminance.",
+    )
+    max_triangles: _Count = Field(
+        default=_DEFAULTS.max_triangles, description="Triangles after which interpolants are not refined."
+    )
+
+    def changes_to(self, settings: LightSettings) -> LightSettings:
         """`settings` with the fields that this document gives, and only those."""
         return replace(settings, **{name: getattr(self, name) for name in self.model_fields_set})
 
     @classmethod
-    def describing(cls, settings: SolverSettings) -> SettingsDocument:
+    def describing(cls, settings: LightSettings) -> SettingsDocument:
         """The document of `settings`, every field given."""
         return cls(**asdict(settings))

@@ -14,6 +14,7 @@ from solver.engine.requests import Encoding, LayerName, NotAvailableError, Rende
 from solver.engine.world import World
 from solver.errors import RenderingUnavailableError
 from solver.geometry.scene import Camera
+from solver.illumination.mesh import InterpolantMesh
 from solver.rendering.device import GlDevice
 from solver.rendering.encoding import PictureFormat, encode_linear, encode_picture
 from solver.rendering.layers import picture_of
@@ -21,12 +22,20 @@ from solver.rendering.renderer import FrameRenderer, Layer, Shading
 from solver.rendering.tessellation import RenderMesh, Tessellator
 from solver.rendering.tone_mapping import tone_map
 from solver.transport.field import RadiosityField
-from solver.types import AnyArray
+from solver.types import AnyArray, FloatArray
 
-BEST_RENDERER: Final = RendererName.GOURAUD
+BEST_RENDERER: Final = RendererName.INTERPOLANT
 """What draws a frame whose renderer is not named."""
 
-_SHADINGS: Final = {RendererName.FLAT: Shading.FLAT, RendererName.GOURAUD: Shading.GOURAUD}
+_SHADINGS: Final = {
+    RendererName.FLAT: Shading.FLAT,
+    RendererName.GOURAUD: Shading.GOURAUD,
+    RendererName.INTERPOLANT: Shading.INTERPOLANT,
+}
+_FINE_LAYERS: Final = (LayerName.TRIANGLE, LayerName.BARYCENTRIC, LayerName.ERROR)
+"""Only interpolants have these."""
+
+_GATHERED_LAYERS: Final = (LayerName.RADIANCE, LayerName.IRRADIANCE, LayerName.ILLUMINANCE)
 _LAYERS: Final = {LayerName(layer.value): layer for layer in Layer}
 
 
@@ -49,11 +58,18 @@ class Drawing:
         return None if self._unavailable is None else str(self._unavailable)
 
     def require(self, renderer: RendererName, layer: LayerName) -> None:
-        """Raise NotAvailableError where this version has no such renderer or layer."""
+        """Raise NotAvailableError where this version has no such renderer, or the renderer no such layer."""
+        if renderer is RendererName.GATHER:
+            if layer not in _GATHERED_LAYERS:
+                raise NotAvailableError("layer of the gather renderer", layer, _GATHERED_LAYERS)
+            return
         if renderer not in _SHADINGS:
-            raise NotAvailableError("renderer", renderer, (*_SHADINGS, RendererName.PATH))
-        if layer not in _LAYERS:
-            raise NotAvailableError("layer", layer, tuple(_LAYERS))
+            raise NotAvailableError(
+                "renderer", renderer, (*_SHADINGS, RendererName.GATHER, RendererName.PATH)
+            )
+        if layer in _FINE_LAYERS and renderer is not RendererName.INTERPOLANT:
+            there = tuple(name for name in _LAYERS if name not in _FINE_LAYERS)
+            raise NotAvailableError(f"layer of the {renderer} renderer", layer, there)
 
     def draw(
         self,
@@ -66,16 +82,48 @@ class Drawing:
     ) -> AnyArray:
         """A layer of `field` as `camera` sees it, (height, width, ...), top row first.
 
-        Radiance in W/(m2 sr), irradiance in W/m2, illuminance in lux, depth and position in metres.
-        Raises NotAvailableError, RenderingUnavailableError.
+        Radiance in W/(m2 sr), irradiance in W/m2, illuminance in lux, depth and position in metres. The
+        interpolant renderer draws the field as gouraud does: of layers that only interpolants have, nothing
+        is known. Raises NotAvailableError, RenderingUnavailableError.
         """
         self.require(renderer, layer)
+        if layer in _FINE_LAYERS:
+            shape = (camera.height, camera.width)
+            if layer is LayerName.TRIANGLE:
+                return np.full(shape, -1, dtype=np.int32)
+            if layer is LayerName.BARYCENTRIC:
+                return np.zeros((*shape, 3), dtype=np.float32)
+            return np.full(shape, np.nan, dtype=np.float32)
+        if renderer is RendererName.INTERPOLANT:
+            renderer = RendererName.GOURAUD
+        return self.draw_mesh(world, self._mesh_of(world, field), camera, renderer, layer, samples)
+
+    def draw_mesh(
+        self,
+        world: World,
+        mesh: RenderMesh | InterpolantMesh,
+        camera: Camera,
+        renderer: RendererName,
+        layer: LayerName,
+        samples: int,
+    ) -> AnyArray:
+        """A layer of `mesh` as `camera` sees it; as `draw`. Raises RenderingUnavailableError."""
         if self._renderer is None:
             # A new error, so that no traceback grows on the one that is kept.
             raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
-        mesh = self._mesh_of(world, field)
         image = self._renderer.draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples)
         return world.scene.luminous_efficacy * image if layer is LayerName.ILLUMINANCE else image
+
+    def pixels_by_triangle(self, mesh: InterpolantMesh, camera: Camera) -> FloatArray:
+        """How many pixels (t,) of `camera` see each triangle's front. Raises RenderingUnavailableError."""
+        if self._renderer is None:
+            raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
+        shown = self._renderer.draw(mesh, camera, Shading.INTERPOLANT, _LAYERS[LayerName.TRIANGLE], 1)
+        counts = np.bincount(shown.ravel() + 1, minlength=len(mesh.triangles) + 1)[1:]
+        patch = mesh.patch[mesh.triangles[:, 0]]
+        surfaces = mesh.surfaces
+        before = np.einsum("pa,pa->p", camera.eye - surfaces.corners[:, 0], surfaces.normal) > 0.0
+        return np.where(before[patch], counts, 0).astype(np.float64)
 
     def _mesh_of(self, world: World, field: RadiosityField) -> RenderMesh:
         if self._tessellator is None or self._tessellator.surfaces is not world.surfaces:

@@ -15,15 +15,25 @@ import numpy as np
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
 from solver.engine.drawing import BEST_RENDERER, Drawing
+from solver.engine.fine import FineLight
+from solver.engine.gathers import GatherFrames
 from solver.engine.paths import PathFrames
 from solver.engine.requests import FrameLimits, FrameRequest, LayerName, NotAvailableError, RendererName
 from solver.engine.solution import Solution
 from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
-from solver.engine.views import Frame, Outlook, PathView, SolutionView, View
+from solver.engine.views import (
+    Frame,
+    GatherView,
+    InterpolantView,
+    Outlook,
+    PathView,
+    SolutionView,
+    View,
+)
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
-from solver.geometry.scene import Scene
-from solver.transport.settings import SolverSettings
+from solver.geometry.scene import Camera, Scene
+from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
 
 
@@ -33,7 +43,7 @@ class Engine:
     def __init__(
         self,
         scene: Scene,
-        settings: SolverSettings | None = None,
+        settings: LightSettings | None = None,
         limits: SceneLimits | None = None,
         drawing: Drawing | None = None,
         frame_limits: FrameLimits | None = None,
@@ -45,8 +55,10 @@ class Engine:
         self._limits = limits or SceneLimits()
         self._limits.check(scene)
         self._frame_limits = frame_limits or FrameLimits()
-        self._settings = settings or SolverSettings()
+        self._settings = settings or LightSettings()
         self._drawing = drawing or Drawing()
+        self._fine: FineLight | None = None
+        self._gathers: GatherFrames | None = None
         self._revision = 1
         self._entries = 0
         self._turn = 0
@@ -63,7 +75,7 @@ class Engine:
         return self._revision
 
     @property
-    def settings(self) -> SolverSettings:
+    def settings(self) -> LightSettings:
         """What the solve goes by."""
         return self._settings
 
@@ -84,18 +96,25 @@ class Engine:
         self._entries += len(changes)
         return changes
 
-    def configure(self, settings: SolverSettings) -> None:
+    def configure(self, settings: LightSettings) -> None:
         """Solve on by other settings."""
-        if settings != self._settings:
-            self._settings = settings
+        if settings == self._settings:
+            return
+        before, self._settings = self._settings, settings
+        if settings.solves_as(before):
+            self._fine, self._gathers, self._turn = None, None, self._turn + 1
+        else:
             self._settle(self._world, self._solution)
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; True while more work remains."""
         solving = self._solution.state is SessionState.SOLVING
-        tracing = self._paths.step(0.5 * budget if solving else budget, self._settings.error_tolerance)
+        refining = self._fine is not None and self._fine.step(0.5 * budget)
+        gathering = self._gathers is not None and self._gathers.step(0.5 * budget)
+        busy = solving or refining or gathering
+        tracing = self._paths.step(0.5 * budget if busy else budget, self._settings.error_tolerance)
         solving = self._solution.step(0.5 * budget if tracing else budget)
-        return solving or tracing
+        return solving or refining or gathering or tracing
 
     def status(self) -> EngineStatus:
         """How the session stands."""
@@ -141,6 +160,7 @@ class Engine:
         """Let light settle in `world`, anew or from `warm_start`."""
         solution = Solution(world, self._settings, warm_start)
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
+        self._fine, self._gathers = None, None
         self._turn += 1
 
     def _view(self, request: FrameRequest) -> View:
@@ -153,7 +173,34 @@ class Engine:
             asked = self._paths.ask(camera, request.samples, request.max_error)
             return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
-        return SolutionView(self._solution, self._drawing, camera, renderer, request.layer, request.samples)
+        fine = self._fine_light()
+        if renderer is RendererName.GATHER:
+            return self._gather_view(fine, camera, request)
+        view = SolutionView(self._solution, self._drawing, camera, renderer, request.layer, request.samples)
+        if renderer is not RendererName.INTERPOLANT:
+            return view
+        if fine is not None:
+            fine.ask(camera)
+        return InterpolantView(view, fine)
+
+    def _fine_light(self) -> FineLight | None:
+        """Fine light, once the solution rests."""
+        if self._fine is None and self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED):
+            self._fine = FineLight(self._solution, self._drawing, self._settings)
+        return self._fine
+
+    def _gather_view(self, fine: FineLight | None, camera: Camera, request: FrameRequest) -> GatherView:
+        frame = None
+        error = self._solution.error_estimate
+        if fine is not None:
+            point = fine.prepare()
+            error = fine.gather_error
+            if point is not None:
+                if self._gathers is None:
+                    self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
+                frame = self._gathers.ask(camera, request.samples)
+        efficacy = self.scene.luminous_efficacy
+        return GatherView(self._solution, frame, request.layer, error, efficacy)
 
     def _outlook(self, request: FrameRequest, view: View) -> Outlook:
         return Outlook(

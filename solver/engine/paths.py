@@ -10,6 +10,7 @@ import time
 from collections import OrderedDict
 from typing import Final, TypeAlias
 
+from solver.engine.cameras import camera_key
 from solver.engine.world import World
 from solver.geometry.scene import Camera
 from solver.pathtracing import PathTracedFrame, PathTracer
@@ -25,7 +26,7 @@ KEPT_PIXELS: Final = 2**22
 
 _SAMPLES_PER_PASS: Final = 4
 
-_Key: TypeAlias = tuple[object, ...]
+_Key: TypeAlias = tuple[float, ...]
 
 
 class AskedFrame:
@@ -70,7 +71,7 @@ class PathFrames:
 
         It is wanted from now on, with at least `samples` a pixel and at most that error.
         """
-        key = _key(camera)
+        key = camera_key(camera)
         asked = self._asked.get(key)
         if asked is None:
             if self._tracer is None:
@@ -94,9 +95,3 @@ class PathFrames:
             return False
         min(unfinished, key=lambda asked: asked.frame.passes).frame.step(budget)
         return True
-
-
-def _key(camera: Camera) -> _Key:
-    vectors = (camera.eye, camera.target, camera.up)
-    numbers = tuple(float(part) for vector in vectors for part in vector)
-    return (*numbers, camera.vertical_fov, camera.width, camera.height)

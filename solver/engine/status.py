@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 from solver.transport.solve import SolverStatistics
 from solver.types import FloatArray
 
@@ -48,7 +48,7 @@ class EngineStatus:
     """Share of the radiosity that has been received and not yet passed on."""
     statistics: SolverStatistics
     warnings: tuple[str, ...]
-    settings: SolverSettings
+    settings: LightSettings
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from solver.engine.drawing import Drawing
+from solver.engine.fine import FineLight
+from solver.engine.gathers import GatherFrame
 from solver.engine.paths import AskedFrame
 from solver.engine.requests import LayerName, RendererName, Wait
 from solver.engine.solution import Solution
 from solver.engine.status import SessionState
 from solver.geometry.scene import Camera
-from solver.types import AnyArray
+from solver.types import LUMINANCE_WEIGHTS, AnyArray
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class View(Protocol):
         """Whether a frame drawn later will be better."""
 
     @property
-    def version(self) -> int:
+    def version(self) -> str:
         """Frames of one version are the same."""
 
     def draw(self) -> AnyArray:
@@ -111,9 +115,9 @@ class SolutionView:
         return self.solution.state is SessionState.SOLVING
 
     @property
-    def version(self) -> int:
+    def version(self) -> str:
         """The version of the field."""
-        return self.solution.version
+        return str(self.solution.version)
 
     def draw(self) -> AnyArray:
         """The picture. Raises RenderingUnavailableError."""
@@ -121,6 +125,97 @@ class SolutionView:
         return self.drawing.draw(
             world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples
         )
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolantView:
+    """The interpolants of a solution at rest seen by a camera; before, the solution as it stands."""
+
+    coarse: SolutionView
+    fine: FineLight | None
+    """None while the solution is worked on"""
+
+    @property
+    def drawable(self) -> bool:
+        """The field can be drawn from the first moment on."""
+        return True
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative error of what the camera sees, or of the field."""
+        if self.fine is None:
+            return self.coarse.error_estimate
+        return self.fine.error_estimate(self.coarse.camera)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solution is, and all that is in view is built."""
+        return self.fine is not None and self.coarse.converged and self.fine.is_complete(self.coarse.camera)
+
+    @property
+    def improving(self) -> bool:
+        """Whether there is work to do."""
+        if self.fine is None:
+            return self.coarse.improving
+        return not self.fine.is_complete(self.coarse.camera)
+
+    @property
+    def version(self) -> str:
+        """Of the field and of what is built on it."""
+        return f"{self.coarse.version}.{0 if self.fine is None else self.fine.version}"
+
+    def draw(self) -> AnyArray:
+        """The picture. Raises RenderingUnavailableError."""
+        mesh = None if self.fine is None else self.fine.mesh()
+        if mesh is None:
+            return self.coarse.draw()
+        c = self.coarse
+        return c.drawing.draw_mesh(c.solution.world, mesh, c.camera, c.renderer, c.layer, c.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class GatherView:
+    """A frame gathered pixel by pixel from a solution at rest."""
+
+    solution: Solution
+    frame: GatherFrame | None
+    """None while the solution is worked on"""
+    layer: LayerName
+    error: float
+    luminous_efficacy: float
+
+    @property
+    def drawable(self) -> bool:
+        """Whether every pixel has its light."""
+        return self.frame is not None and self.frame.is_complete
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative error of the light in it."""
+        return self.error
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solution is, and the frame is complete."""
+        return self.solution.state is SessionState.CONVERGED and self.drawable
+
+    @property
+    def improving(self) -> bool:
+        """Until it is complete."""
+        return not self.drawable and self.solution.state is not SessionState.FAILED
+
+    @property
+    def version(self) -> str:
+        """Of the field, and the pixels done."""
+        return f"{self.solution.version}.{0 if self.frame is None else self.frame.done}"
+
+    def draw(self) -> AnyArray:
+        """The picture, (h, w, 3), or (h, w) lux."""
+        assert self.frame is not None
+        image = self.frame.image(self.layer)
+        if self.layer is LayerName.ILLUMINANCE:
+            return self.luminous_efficacy * (image @ LUMINANCE_WEIGHTS.astype(np.float32))
+        return image
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +246,9 @@ class PathView:
         return not self.asked.is_done(self.tolerance)
 
     @property
-    def version(self) -> int:
+    def version(self) -> str:
         """Rays in the mean."""
-        return self.asked.frame.ray_count
+        return str(self.asked.frame.ray_count)
 
     def draw(self) -> AnyArray:
         """Radiance, (height, width, 3) W/(m2 sr)."""

@@ -28,15 +28,15 @@ from solver.engine.requests import (
 )
 from solver.engine.world import World
 from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
+from solver.illumination.settings import LightSettings
 from solver.pathtracing import PathTracer
 from solver.rendering.encoding import LinearFormat, PictureFormat
 from solver.rendering.tessellation import Tessellator
 from solver.rendering.tone_mapping import ToneCurve
-from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 
 _SLICE: Final = 1.0
-_SETTINGS: Final = SolverSettings(error_tolerance=0.03)
+_SETTINGS: Final = LightSettings(error_tolerance=0.03)
 """Reached by some rounds of refinement, so that links are split, resampled and inherited."""
 
 _GREY: Final = (0.5, 0.5, 0.5)

@@ -1,4 +1,4 @@
-"""Where interpolants are sampled: corners and middles of edges, once on each side of a jump ([H 3.3, 6.3])."""
+"""Where interpolants are sampled: corners and middles of edges, once on each side of a jump ([H 3.3])."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def place_samples(mesh: Triangulation) -> Samples:
     # Middles, as the first of their two triangles has them.
     first = np.full(middles, 3 * t, dtype=np.int64)
     np.minimum.at(first, middle.ravel(), np.arange(3 * t))
-    of, k = first // 3, first % 3
+    of, k = (first // 3).astype(np.int32), (first % 3).astype(np.int32)
     triangle[corners:] = of
     here = 0.5 * (vertices[of, k] + vertices[of, (k + 1) % 3])
     nudge = np.where(middle_bounded[of, k, None], NUDGE, 0.0)

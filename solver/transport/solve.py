@@ -29,6 +29,7 @@ from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
 from solver.types import FloatArray, Points, Spectra
+from solver.visibility.bvh import Hierarchy
 from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import FULL, NONE, PARTIAL
@@ -123,6 +124,16 @@ class RadiositySolver:
                 break
         self._seconds += time.perf_counter() - start
         return self.outcome is SolveOutcome.RUNNING
+
+    @property
+    def state(self) -> TransportState:
+        """Elements, links and light, to be read while nothing works on them."""
+        return self._state
+
+    @property
+    def hierarchy(self) -> Hierarchy:
+        """Of the patches that block."""
+        return self._linker.hierarchy
 
     @property
     def warnings(self) -> tuple[str, ...]:

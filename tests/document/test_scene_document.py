@@ -20,7 +20,7 @@ from solver.document.samples import load_sample, load_scene, parse_scene, sample
 from solver.document.settings import SettingsDocument
 from solver.errors import LimitExceededError, SceneError
 from solver.geometry.scene import Scene
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 
 SQUARE: dict[str, Any] = {
     "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
@@ -236,16 +236,16 @@ def test_limits_count_faces_and_corners() -> None:
 
 
 def test_settings_change_only_what_is_given() -> None:
-    before = SolverSettings(error_tolerance=0.1, minimum_area=0.5)
+    before = LightSettings(error_tolerance=0.1, minimum_area=0.5)
     after = SettingsDocument.model_validate({"error_tolerance": 0.01}).changes_to(before)
-    assert after == SolverSettings(error_tolerance=0.01, minimum_area=0.5)
+    assert after == LightSettings(error_tolerance=0.01, minimum_area=0.5)
     assert SettingsDocument.model_validate({"minimum_area": None}).changes_to(before).minimum_area is None
 
 
 def test_settings_describe_themselves() -> None:
-    settings = SolverSettings(error_tolerance=0.1, max_links=77)
+    settings = LightSettings(error_tolerance=0.1, max_links=77)
     document = SettingsDocument.describing(settings)
-    assert document.changes_to(SolverSettings()) == settings
+    assert document.changes_to(LightSettings()) == settings
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from pydantic import TypeAdapter
 
 from solver.document.edits import Edit
 from solver.engine.engine import Engine
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 
 EDITS: TypeAdapter[list[Edit]] = TypeAdapter(list[Edit])
-LOOSE = SolverSettings(error_tolerance=0.05)
+LOOSE = LightSettings(error_tolerance=0.05)
 
 
 def settle(engine: Engine) -> None:

@@ -19,7 +19,7 @@ from solver.engine.requests import (
 from solver.engine.status import ChangeState, SessionState
 from solver.errors import LimitExceededError, RevisionConflictError, SceneError
 from solver.geometry.scene import Scene
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, AnyArray
 from tests.engine.acting import LOOSE, edits, settle
 from tests.engine.scenes import box
@@ -49,7 +49,7 @@ def test_an_engine_starts_unsolved_and_converges(engine: Engine) -> None:
 
 
 def test_progress_never_goes_back(drawing: Drawing) -> None:
-    engine = Engine(box(), SolverSettings(error_tolerance=0.005), drawing=drawing)
+    engine = Engine(box(), LightSettings(error_tolerance=0.005), drawing=drawing)
     told = [engine.status().progress]
     while engine.step(0.001):
         told.append(engine.status().progress)
@@ -58,12 +58,12 @@ def test_progress_never_goes_back(drawing: Drawing) -> None:
 
 
 def test_an_element_limit_pauses_and_says_so(drawing: Drawing) -> None:
-    engine = Engine(box(), SolverSettings(error_tolerance=0.001, max_elements=64), drawing=drawing)
+    engine = Engine(box(), LightSettings(error_tolerance=0.001, max_elements=64), drawing=drawing)
     settle(engine)
     status = engine.status()
     assert status.state is SessionState.PAUSED
     assert any("max_elements" in warning for warning in status.warnings)
-    engine.configure(SolverSettings(error_tolerance=0.05))
+    engine.configure(LightSettings(error_tolerance=0.05))
     settle(engine)
     assert engine.status().state is SessionState.CONVERGED
 
@@ -72,7 +72,7 @@ def test_other_settings_start_the_work_again(engine: Engine) -> None:
     settle(engine)
     engine.configure(LOOSE)
     assert engine.status().state is SessionState.CONVERGED, "the same settings change nothing"
-    engine.configure(SolverSettings(error_tolerance=0.02))
+    engine.configure(LightSettings(error_tolerance=0.02))
     assert engine.status().state is SessionState.SOLVING
     assert engine.revision == 1
     settle(engine)

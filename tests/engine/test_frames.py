@@ -18,7 +18,7 @@ from solver.engine.requests import (
     RendererName,
 )
 from solver.errors import LimitExceededError
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS
 from tests.engine.acting import LOOSE, edits, settle
 from tests.engine.scenes import box
@@ -75,7 +75,7 @@ def test_the_witness_sees_what_the_solve_does(drawing: Drawing) -> None:
     """Frames come nearer to the path-traced one as the tolerance falls."""
     differences = []
     for tolerance in (0.05, 0.005):
-        engine = Engine(box(), SolverSettings(error_tolerance=tolerance), drawing=drawing)
+        engine = Engine(box(), LightSettings(error_tolerance=tolerance), drawing=drawing)
         settle(engine)
         request = FrameRequest(renderer=RendererName.PATH, samples=256)
         while not engine.outlook(request).drawable:

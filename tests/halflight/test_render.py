@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import Result
 
 from halflight import pictures
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 from tests.halflight.commands import WITHOUT_OPENGL, invoke, run
 
 SCENE: dict[str, Any] = {
@@ -233,7 +233,7 @@ def test_a_picture_that_cannot_be_written_is_told(scene: Path, tmp_path: Path) -
 def test_a_picture_short_of_its_tolerance_is_written_and_told(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pictures, "SolverSettings", functools.partial(SolverSettings, max_elements=20))
+    monkeypatch.setattr(pictures, "LightSettings", functools.partial(LightSettings, max_elements=20))
     output = tmp_path / "out.png"
     result = render(scene, output, "--tolerance", "0.001")
     assert result.exit_code == 3

@@ -48,7 +48,7 @@ from solver.document.models import MaterialDocument
 from solver.document.samples import load_sample
 from solver.engine.engine import Engine
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, NotAvailableError, RendererName
-from solver.transport.settings import SolverSettings
+from solver.illumination.settings import LightSettings
 
 def finish(engine):
     while engine.step(1.0):
@@ -56,7 +56,7 @@ def finish(engine):
 
 frames = 0
 for sample in ("cube_room", "office"):
-    engine = Engine(load_sample(sample), SolverSettings(error_tolerance=0.05), drawing=drawing)
+    engine = Engine(load_sample(sample), LightSettings(error_tolerance=0.05), drawing=drawing)
     for _ in range(2):
         finish(engine)
         for renderer in RendererName:

@@ -1,0 +1,182 @@
+"""Fine light: the interpolants of a settled solution, for the cameras that are in use.
+
+The work begins when a solution rests and somebody looks at it: what the links missed is put back, the
+discontinuities are found and weighed, the leaves are triangulated, and interpolants are built where a
+camera looks, until the picture is within the tolerance. It ends there, and goes on for the next camera.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from solver.engine.cameras import camera_key
+from solver.engine.drawing import Drawing
+from solver.engine.solution import Solution
+from solver.geometry.scene import Camera
+from solver.illumination.cells import Cells
+from solver.illumination.correction import corrected
+from solver.illumination.interpolants import Interpolants
+from solver.illumination.lines import ActiveLines, LineStatistics, activate_lines
+from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.refinement import ViewError, cells_to_split, view_error
+from solver.illumination.settings import LightSettings
+from solver.illumination.splitting import split_cells
+from solver.illumination.triangulation import Triangulation, triangulate
+from solver.types import FloatArray
+
+KEPT: Final = 4
+"""Cameras kept in mind at once; a new one takes the place of the one asked for longest ago."""
+
+_GATHER_ERROR: Final = 0.6
+"""Error of point irradiance from a corrected solution, relative to the estimated error of the solution."""
+
+
+class FineLight:
+    """The interpolants of one solution in the making."""
+
+    def __init__(self, solution: Solution, drawing: Drawing, settings: LightSettings) -> None:
+        self.version = 0
+        """Counts the changes of what can be drawn."""
+        self._solution = solution
+        self._drawing = drawing
+        self._settings = settings
+        self._cameras: OrderedDict[tuple[float, ...], Camera] = OrderedDict()
+        self._seen: dict[tuple[float, ...], FloatArray] = {}
+        self._interpolants: Interpolants | None = None
+        self._lines: ActiveLines | None = None
+        self._point: PointIrradiance | None = None
+        self._is_resting = False
+        self._is_preparing = False
+        self._work = self._run()
+
+    # --- what it holds -------------------------------------------------------------------------------
+
+    @property
+    def interpolants(self) -> Interpolants | None:
+        """The interpolants; None until there are any."""
+        return self._interpolants
+
+    @property
+    def point_irradiance(self) -> PointIrradiance | None:
+        """Point irradiance by the corrected solution; None until it is."""
+        return self._point
+
+    @property
+    def line_statistics(self) -> LineStatistics | None:
+        """How many discontinuities there are; None until they have been found."""
+        return None if self._lines is None else self._lines.statistics
+
+    def mesh(self) -> InterpolantMesh | None:
+        """What to draw; None until there is anything."""
+        return None if self._interpolants is None else self._interpolants.mesh()
+
+    def error_estimate(self, camera: Camera) -> float:
+        """Relative error of the irradiance that `camera` sees, the solution's included."""
+        solution = self._solution.error_estimate
+        seen = self._error_seen(camera)
+        return solution if seen is None else float(np.hypot(self.gather_error, seen.relative))
+
+    def is_complete(self, camera: Camera) -> bool:
+        """Whether all that `camera` sees is built, and no cell is to be split for it."""
+        seen = self._error_seen(camera)
+        return seen is not None and seen.share_known >= 1.0 and self._is_resting
+
+    @property
+    def gather_error(self) -> float:
+        """Estimated relative error of point irradiances."""
+        return _GATHER_ERROR * self._solution.error_estimate
+
+    # --- the work ------------------------------------------------------------------------------------
+
+    def prepare(self) -> PointIrradiance | None:
+        """Point irradiance by the corrected solution; None until it is, which is seen to from now on."""
+        self._is_preparing = self._point is None
+        return self._point
+
+    def ask(self, camera: Camera) -> None:
+        """Build what `camera` sees, from now on."""
+        key = camera_key(camera)
+        is_new = key not in self._cameras
+        self._cameras[key] = camera
+        self._cameras.move_to_end(key)
+        while len(self._cameras) > KEPT:
+            gone, _ = self._cameras.popitem(last=False)
+            self._seen.pop(gone, None)
+        if is_new and self._interpolants is not None:
+            self._look(self._interpolants)
+            self._is_resting = False
+
+    def step(self, budget: float) -> bool:
+        """Work for about `budget` seconds; True while more work remains."""
+        start = time.perf_counter()
+        while self._has_work():
+            next(self._work)
+            if time.perf_counter() - start >= budget:
+                break
+        return self._has_work()
+
+    def _has_work(self) -> bool:
+        preparing = self._is_preparing and self._point is None
+        return preparing or (bool(self._cameras) and not self._is_resting)
+
+    def _run(self) -> Iterator[None]:
+        solver, surfaces = self._solution.solver, self._solution.world.surfaces
+        state, hierarchy = solver.state, solver.hierarchy
+        point = PointIrradiance.of(state, hierarchy, self._settings.point_accuracy)
+        yield
+        state = yield from corrected(state, point)
+        point = self._point = PointIrradiance.of(state, hierarchy, self._settings.point_accuracy)
+        yield
+        field = self._solution.field()
+        cells = Cells.of(field)
+        self._lines = yield from activate_lines(state, hierarchy, field, self._settings)
+        triangulation: Triangulation | None = None
+        while True:
+            triangulation = triangulate(cells, surfaces, self._lines.edges, triangulation)
+            yield
+            interpolants = Interpolants(
+                point, state.tree.leaves, cells, triangulation, field.irradiance, self._interpolants
+            )
+            self._interpolants = interpolants
+            self._look(interpolants)
+            yield
+            finer = cells
+            while finer is cells:
+                while interpolants.step():
+                    self.version += 1
+                    yield
+                finer = self._split(interpolants, cells)
+                if finer is cells:
+                    self._is_resting = True
+                    yield
+            cells = finer
+
+    def _split(self, interpolants: Interpolants, cells: Cells) -> Cells:
+        if len(interpolants.triangulation.triangles) > self._settings.max_triangles:
+            return cells
+        tolerance = self._settings.interpolation_tolerance
+        chosen = np.zeros(len(cells.patch), dtype=np.bool_)
+        for pixels in self._seen.values():
+            chosen |= cells_to_split(interpolants, pixels, tolerance)
+        return split_cells(cells, chosen) if chosen.any() else cells
+
+    def _look(self, interpolants: Interpolants) -> None:
+        """Tell the interpolants what the cameras see."""
+        self._seen.clear()
+        for key, camera in self._cameras.items():
+            pixels = self._drawing.pixels_by_triangle(interpolants.mesh(), camera)
+            self._seen[key] = pixels
+            interpolants.want(pixels)
+        self.version += 1
+
+    def _error_seen(self, camera: Camera) -> ViewError | None:
+        pixels = self._seen.get(camera_key(camera))
+        if self._interpolants is None or pixels is None:
+            return None
+        return view_error(self._interpolants, pixels)

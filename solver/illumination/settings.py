@@ -1,0 +1,43 @@
+"""What a user may set about fine light, beside the solve: parameters 4, 5 and 8 of [H appendix A], and more.
+
+Needless here are parameter 6, the shortest backprojected segment, since visible parts are cut exactly
+(`visible_parts`), and 9, the distance by which a source is pushed off its receiver: samples are taken from
+inside of their triangle (`samples.NUDGE`, parameter 10), where the irradiance is finite and smooth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from solver.transport.settings import SolverSettings
+
+
+@dataclass(frozen=True)
+class LightSettings(SolverSettings):
+    """Parameters of a solve and of what is made of it."""
+
+    interpolation_error: float | None = None
+    """Relative RMS error of irradiance that interpolants may add to that of the solution, over what is in
+    view; None: half of `error_tolerance`."""
+    point_accuracy: float = 1e-3
+    """Share of a point's irradiance that the treatment of one source may err by."""
+    max_leaf_discontinuities: int = 10
+    """[H A.5] Most sets of collinear discontinuities that cut one leaf."""
+    minimum_discontinuity_weight: float | None = None
+    """[H A.4] W/m2 of irradiance (luminance) that a quadratic over a leaf must be wrong by without a
+    discontinuity for it to be meshed; None: derived from `interpolation_error` and the light in the scene."""
+    max_triangles: int = 400_000
+    """Triangles after which cells are not split any more."""
+
+    @property
+    def interpolation_tolerance(self) -> float:
+        """`interpolation_error`, or what stands for it."""
+        if self.interpolation_error is not None:
+            return self.interpolation_error
+        return 0.5 * self.error_tolerance
+
+    def solves_as(self, other: LightSettings) -> bool:
+        """Whether a solve by these is one by `other`."""
+        return all(
+            getattr(self, field.name) == getattr(other, field.name) for field in fields(SolverSettings)
+        )

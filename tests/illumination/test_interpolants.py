@@ -1,0 +1,92 @@
+"""Interpolants in the making: what they start from, how they are built, what outlives a split."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.illumination.cells import Cells
+from solver.illumination.interpolants import Interpolants
+from solver.illumination.refinement import cells_to_split, view_error
+from solver.illumination.splitting import split_cells
+from solver.illumination.triangulation import triangulate
+from tests.illumination.fine import build_all, interpolants_of, relative_error
+from tests.transport.solving import furnace, lit_cube, shelf, solved
+
+SHELF = solved(shelf(), 0.05)
+
+
+def test_before_any_sample_is_computed_the_solution_shows() -> None:
+    interpolants = interpolants_of(SHELF)
+    mesh = interpolants.mesh()
+    assert not mesh.is_fine.any()
+    middle = mesh.coefficients @ np.ones(3) / 3.0
+    value = (
+        middle[:, 0] / 9
+        + middle[:, 1] / 9
+        + middle[:, 2] / 3
+        + middle[:, 3] / 9
+        + middle[:, 4] / 3
+        + middle[:, 5]
+    )
+    field = SHELF.field()
+    bright = (field.irradiance.mean(axis=1))[mesh.leaf]
+    assert abs(np.average(value - bright, weights=interpolants.area)) < 0.02 * bright.mean()
+
+
+def test_samples_become_point_irradiances() -> None:
+    interpolants = build_all(interpolants_of(SHELF))
+    assert interpolants.is_fine.all() and interpolants.is_checked.all()
+    position, value, exact = interpolants.sample_points()
+    assert exact.all()
+    owner = np.empty(len(position), dtype=np.int64)
+    owner[interpolants.nodes.ravel()] = np.repeat(np.arange(len(interpolants.nodes)), 6)
+    few = np.random.default_rng(1).choice(len(position), 50, replace=False)
+    leaves = SHELF.state.tree.leaves
+    again = interpolants._point.at(position[few], leaves[interpolants.triangulation.leaf[owner[few]]])
+    np.testing.assert_allclose(value[few], again, rtol=1e-9)
+
+
+def test_what_is_wanted_comes_first_and_nothing_else_is_built() -> None:
+    interpolants = interpolants_of(SHELF)
+    pixels = np.zeros(len(interpolants.triangulation.triangles))
+    pixels[7:13] = 5.0
+    interpolants.want(pixels)
+    while interpolants.step():
+        pass
+    assert interpolants.is_checked[7:13].all() and interpolants.is_checked.sum() == 6
+    assert interpolants.is_fine[7:13].all() and not interpolants.is_fine.all()
+    assert interpolants.evaluations <= 6 * 7
+
+
+def test_constant_light_is_exact() -> None:
+    interpolants = build_all(interpolants_of(solved(furnace(0.5), 0.05)))
+    assert relative_error(interpolants) < 2e-3
+    np.testing.assert_allclose(interpolants.mean_luminance(), 2.0, rtol=0.02)
+
+
+def test_splitting_lowers_the_error_and_keeps_what_was_sampled() -> None:
+    solver = solved(lit_cube(), 0.1)
+    coarse = build_all(interpolants_of(solver))
+    pixels = np.full(len(coarse.triangulation.triangles), 100.0)
+    before = view_error(coarse, pixels)
+    assert before.share_known == 1.0
+    chosen = cells_to_split(coarse, pixels, 0.5 * before.relative)
+    assert 0 < chosen.sum() < len(chosen)
+    cells = split_cells(Cells.of(solver.field()), chosen)
+    mesh = triangulate(cells, solver.surfaces, coarse.triangulation.linework.edges, coarse.triangulation)
+    fine = Interpolants(
+        coarse._point, solver.state.tree.leaves, cells, mesh, solver.field().irradiance, coarse
+    )
+    assert 0 < fine.is_fine.sum() < len(fine.is_fine), "unsplit cells keep their samples"
+    build_all(fine)
+    assert fine.evaluations < len(fine.sample_points()[0])
+    assert relative_error(fine) < 0.8 * relative_error(coarse)
+
+
+def test_nothing_is_split_within_the_tolerance_or_for_less_than_a_few_pixels() -> None:
+    interpolants = build_all(interpolants_of(SHELF))
+    pixels = np.full(len(interpolants.triangulation.triangles), 100.0)
+    assert not cells_to_split(interpolants, pixels, 1.0).any()
+    assert not cells_to_split(interpolants, 1e-3 * pixels, 1e-4).any()
+    assert not cells_to_split(interpolants, 0.0 * pixels, 1e-4).any()
+    assert cells_to_split(interpolants, pixels, 1e-4).any()
