@@ -21,7 +21,7 @@ from solver.geometry.scene import Camera
 from solver.illumination.cells import Cells
 from solver.illumination.correction import corrected
 from solver.illumination.interpolants import Interpolants
-from solver.illumination.lines import ActiveLines, LineStatistics, activate_lines
+from solver.illumination.lines import Lines, find_lines
 from solver.illumination.mesh import InterpolantMesh
 from solver.illumination.point_irradiance import PointIrradiance
 from solver.illumination.refinement import ViewError, cells_to_split, view_error
@@ -49,7 +49,7 @@ class FineLight:
         self._cameras: OrderedDict[tuple[float, ...], Camera] = OrderedDict()
         self._seen: dict[tuple[float, ...], FloatArray] = {}
         self._interpolants: Interpolants | None = None
-        self._lines: ActiveLines | None = None
+        self._lines: Lines | None = None
         self._point: PointIrradiance | None = None
         self._is_resting = False
         self._is_preparing = False
@@ -68,9 +68,9 @@ class FineLight:
         return self._point
 
     @property
-    def line_statistics(self) -> LineStatistics | None:
-        """How many discontinuities there are; None until they have been found."""
-        return None if self._lines is None else self._lines.statistics
+    def lines(self) -> Lines | None:
+        """The discontinuities; None until they have been found."""
+        return self._lines
 
     def mesh(self) -> InterpolantMesh | None:
         """What to draw; None until there is anything."""
@@ -135,7 +135,7 @@ class FineLight:
         yield
         field = self._solution.field()
         cells = Cells.of(field)
-        self._lines = yield from activate_lines(state, hierarchy, field, self._settings)
+        self._lines = yield from find_lines(state, hierarchy, field, self._settings)
         triangulation: Triangulation | None = None
         while True:
             triangulation = triangulate(cells, surfaces, self._lines.edges, triangulation)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.illumination.cells import Cells
+from solver.illumination.cells import Cells, ConstraintEdges
 from solver.illumination.interpolants import Interpolants
 from solver.illumination.refinement import cells_to_split, view_error
 from solver.illumination.splitting import split_cells
 from solver.illumination.triangulation import triangulate
 from tests.illumination.fine import build_all, interpolants_of, relative_error
-from tests.transport.solving import furnace, lit_cube, shelf, solved
+from tests.transport.solving import furnace, shelf, solved
 
 SHELF = solved(shelf(), 0.05)
 
@@ -65,7 +65,7 @@ def test_constant_light_is_exact() -> None:
 
 
 def test_splitting_lowers_the_error_and_keeps_what_was_sampled() -> None:
-    solver = solved(lit_cube(), 0.1)
+    solver = SHELF
     coarse = build_all(interpolants_of(solver))
     pixels = np.full(len(coarse.triangulation.triangles), 100.0)
     before = view_error(coarse, pixels)
@@ -73,7 +73,7 @@ def test_splitting_lowers_the_error_and_keeps_what_was_sampled() -> None:
     chosen = cells_to_split(coarse, pixels, 0.5 * before.relative)
     assert 0 < chosen.sum() < len(chosen)
     cells = split_cells(Cells.of(solver.field()), chosen)
-    mesh = triangulate(cells, solver.surfaces, coarse.triangulation.linework.edges, coarse.triangulation)
+    mesh = triangulate(cells, solver.surfaces, ConstraintEdges.none(), coarse.triangulation)
     fine = Interpolants(
         coarse._point, solver.state.tree.leaves, cells, mesh, solver.field().irradiance, coarse
     )

@@ -9,7 +9,7 @@ from solver.types import FloatArray
 from tests.illumination.fine import edge, triangulated
 from tests.transport.solving import shelf, solved
 
-SOLVER = solved(shelf(), 0.1)
+SOLVER = solved(shelf(), 0.02)
 FLOOR = 0
 
 
