@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.document.samples import load_sample
+from solver.errors import LimitExceededError
 from solver.geometry.scene import Camera
 from solver.geometry.surfaces import Surfaces, flatten
 from solver.illumination.mesh import InterpolantMesh
@@ -309,6 +310,17 @@ def test_new_coefficients_are_all_that_is_uploaded_for_them(device: GlDevice) ->
     assert_agree(renderer, mesh, view)
     assert renderer.uploaded == before
     renderer.release()
+
+
+def test_more_triangles_than_the_device_takes_are_refused(
+    renderer: FrameRenderer, device: GlDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh = random_mesh(surfaces_of(polygons(SQUARE)), even(3), 0)
+    with monkeypatch.context() as patched:
+        patched.setattr(device.entry_points, "most_texels", 4 * len(mesh.triangles) - 1)
+        with pytest.raises(LimitExceededError, match="texels of frames"):
+            renderer.draw(mesh, LOOK_DOWN, Shading.INTERPOLANT, Layer.RADIANCE)
+    assert_agree(renderer, mesh, LOOK_DOWN)
 
 
 def test_frames_follow_the_mesh(renderer: FrameRenderer) -> None:
