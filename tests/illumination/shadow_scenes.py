@@ -41,9 +41,9 @@ def solid(
     triangulated: bool = False,
 ) -> SceneObject:
     """A cube with the given corners (8, 3), perhaps without some of its SIDES."""
-    faces = [face for k, face in enumerate(SIDES) if k not in without]
+    faces: list[tuple[int, ...]] = [face for k, face in enumerate(SIDES) if k not in without]
     if triangulated:
-        faces = [half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]
+        faces = [half for face in faces for half in (face[:3], (face[0], *face[2:]))]
     return SceneObject(name, Mesh(corners, tuple(faces)), GREY)
 
 
