@@ -33,6 +33,7 @@ from solver.engine.views import (
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
+from solver.illumination.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
 
@@ -148,12 +149,19 @@ class Engine:
     def probe(self, positions: Points, normals: FloatArray) -> ProbeResult:
         """The exact gather from the current solution at points (n, 3) with normals (n, 3) of any length."""
         unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        irradiance, error = self._solution.solver.irradiance_at(positions, unit)
+        fine = self._fine_light()
+        point = None if fine is None else fine.prepare()
+        error = self._solution.error_estimate if fine is None or point is None else fine.gather_error
+        if point is None:
+            solver = self._solution.solver
+            point = PointIrradiance.of(solver.state, solver.hierarchy, self._settings.point_accuracy)
+        found = np.broadcast_to(point.anywhere(positions, unit), (len(positions), 3))
+        lit = found.any(axis=1)
         return ProbeResult(
             revision=self._revision,
-            irradiance=irradiance,
-            illuminance=self.scene.luminous_efficacy * (irradiance @ LUMINANCE_WEIGHTS),
-            error_estimate=error,
+            irradiance=found,
+            illuminance=self.scene.luminous_efficacy * (found @ LUMINANCE_WEIGHTS),
+            error_estimate=np.where(lit, min(1.0, error), 0.0),
         )
 
     def _settle(self, world: World, warm_start: Solution | None) -> None:

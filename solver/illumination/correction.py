@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 
-from solver.illumination.light import Sources
 from solver.illumination.point_irradiance import PointIrradiance
 from solver.transport.pace import Pace
 from solver.transport.state import TransportState
@@ -61,7 +60,7 @@ def _defects(state: TransportState, point: PointIrradiance, told: Spectra) -> Ge
     tree, leaves = state.tree, state.tree.leaves
     asked = _spread_by_area(tree.area[leaves])
     chosen = leaves[asked]
-    point = replace(point, light=Sources.of(state, reflected_only=True), emission=0.0 * state.emission)
+    point = point.of_reflected()
     middle = tree.centroid[chosen]
     if 4 * len(leaves) <= MOST_POINTS:
         # A triangle's last corner counts twice, which shifts the mean by little.

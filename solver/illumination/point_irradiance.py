@@ -7,7 +7,7 @@ from all patches.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -51,7 +51,9 @@ class PointIrradiance:
     """None where all patches are asked"""
     lamps: Lamps | None
     light: Sources
-    """reflected light over links, all of it where all patches are asked"""
+    """all that leaves the elements"""
+    reflected: Sources
+    """what of it is reflected"""
     received: FloatArray
     """(n, 3, channels) the solution's own irradiance functions"""
     emission: Spectra
@@ -87,11 +89,16 @@ class PointIrradiance:
             links=state.links,
             by_element=by_element,
             lamps=lamps,
-            light=Sources.of(state, reflected_only=lamps is not None),
+            light=Sources.of(state, reflected_only=False),
+            reflected=Sources.of(state, reflected_only=True),
             received=state.received,
             emission=state.emission,
             weights=state.weights,
         )
+
+    def of_reflected(self) -> PointIrradiance:
+        """That of the reflected light alone."""
+        return replace(self, light=self.reflected, emission=np.zeros_like(self.emission))
 
     def at(self, positions: Points, elements: IntArray) -> Spectra:
         """Irradiance (n, channels) in W/m2 at positions (n, 3) on leaf `elements` (n,).
@@ -131,7 +138,7 @@ class PointIrradiance:
         normals: FloatArray,
         elements: IntArray,
     ) -> Spectra:
-        tree, links, light = self.tree, self.links, self.light
+        tree, links, light = self.tree, self.links, self.reflected
         out = np.empty((len(positions), self.emission.shape[1]))
         expected = np.maximum(self.solved(positions, elements) @ self.weights, 0.0)
         most = max(int(links.blocker_count.max(initial=0)), int(lamps.blocker_count.max(initial=0)))
@@ -144,7 +151,7 @@ class PointIrradiance:
                 lamps.blocker_start, lamps.blocker_count, lamps.pool, self.emission, tree.child,
                 tree.child_count, tree.corners, tree.corner_count, tree.patch, tree.centroid, tree.axes,
                 tree.patch_normal, light.functions, light.luminance, light.spread, light.slope,
-                light.extent, most,                 _ON_PLANE * self.surfaces.size, start, stop, out,
+                light.extent, most, _ON_PLANE * self.surfaces.size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)

@@ -20,7 +20,6 @@ from solver.geometry.surfaces import Surfaces
 from solver.transport.closure import balance, is_closed
 from solver.transport.estimate import estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
-from solver.transport.gather import irradiance_at
 from solver.transport.linking import Light, Linker
 from solver.transport.pace import Pace
 from solver.transport.pushpull import means
@@ -42,11 +41,6 @@ _UNSHOT: Final = 0.03
 
 _LINKING: Final = 0.2
 """Part of the progress that linking the patches makes."""
-
-_PROBE_RAYS: Final = 1 << 20
-_LEAST_RAYS: Final = 128
-_MOST_RAYS: Final = 8192
-"""Rays of one call of `irradiance_at`, and their bounds per point."""
 
 _REFINE_SHARE: Final = 0.5
 """A round of refinement deals with at most this share of the squared error."""
@@ -180,18 +174,6 @@ class RadiositySolver:
             radiosity=self._to_rgb(state.emission[patch] + state.reflectance[patch] * received),
             irradiance=self._to_rgb(received),
         )
-
-    def irradiance_at(self, positions: Points, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The gather at points (n, 3) with unit normals (n, 3) from the solution as it stands.
-
-        Returns irradiance (n, 3) in W/m2, and the estimated relative error of its luminance (n,): that of
-        the solution and that of the gather's own rays.
-        """
-        per_point = max(_LEAST_RAYS, min(_MOST_RAYS, _PROBE_RAYS // max(len(positions), 1)))
-        irradiance, noise = irradiance_at(self._state, self._rays, positions, normals, per_point)
-        bright = irradiance @ self._state.weights
-        relative = np.where(bright > 0.0, noise / np.where(bright > 0.0, bright, 1.0), 0.0)
-        return self._to_rgb(irradiance), np.minimum(1.0, np.hypot(relative, self.error_estimate))
 
     def _to_rgb(self, spectra: Spectra) -> Spectra:
         return np.repeat(spectra, 3, axis=1) if self._state.channels == 1 else spectra.copy()

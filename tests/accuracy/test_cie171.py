@@ -19,7 +19,7 @@ from solver.geometry.scene import Mesh, SceneObject
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
 from tests.pathtracing.worlds import material, polygon, world
-from tests.transport.solving import box, solved
+from tests.transport.solving import box, irradiance_at, solved
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"
 CASES: dict[str, Any] = json.loads((REFERENCE / "cie171.json").read_text())
@@ -86,7 +86,7 @@ def at_points(
     points = [entry["points"][name] for name in names]
     positions = np.array([p["p"] if isinstance(p, dict) else p for p in points], dtype=float)
     normals = np.array([p["n"] if isinstance(p, dict) else (0, 0, 1) for p in points], dtype=float)
-    found, _ = solved(of).irradiance_at(positions, normals)
+    found = irradiance_at(solved(of), positions, normals)
     exact = np.array([entry[recomputed][name] for name in names])
     return found[:, 0], exact, np.array([entry[published][name] for name in names])
 
@@ -136,7 +136,7 @@ def test_5_4_flux_is_conserved_at_points(where: tuple[float, float, float]) -> N
     """The illuminance of a black room, integrated over its walls, is all that is emitted."""
     solver = solved(world(box("room", 0.0, 0.0, high=(4.0, 4.0, 3.0)), bulb(where, 0.02, FLUX)))
     positions, normals, areas = wall_points((4.0, 4.0, 3.0))
-    found, _ = solver.irradiance_at(positions, normals)
+    found = irradiance_at(solver, positions, normals)
     assert areas.sum() == pytest.approx(80.0)
     assert float(areas @ found[:, 0]) == pytest.approx(FLUX, rel=1e-3)
 
@@ -208,7 +208,7 @@ def test_5_8_mean_indirect_light(reflectance: float) -> None:
 def test_5_8_light_at_points(reflectance: float) -> None:
     """Direct and indirect light by their own tables, at a face's middle, and near an edge and a corner."""
     points = np.array([[2.0, 2.0, 0.0], [1.0, 1.0, 0.0], [0.08, 2.0, 0.0], [0.08, 0.08, 0.0]])
-    found, _ = room_5_8(reflectance, 0.01).irradiance_at(points, np.tile([0.0, 0.0, 1.0], (4, 1)))
+    found = irradiance_at(room_5_8(reflectance, 0.01), points, np.tile([0.0, 0.0, 1.0], (4, 1)))
     r = points - [2.0, 2.0, 2.0]
     distance = np.linalg.norm(r, axis=1)
     direct = FLUX / (4.0 * np.pi) * 2.0 / distance**3

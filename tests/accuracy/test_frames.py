@@ -10,7 +10,7 @@ import pytest
 from solver.document.samples import load_sample
 from solver.engine.world import World
 from solver.types import LUMINANCE_WEIGHTS
-from tests.transport.solving import solved
+from tests.transport.solving import corrected_irradiance_at, solved
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"
 
@@ -57,10 +57,12 @@ def test_gathered_pixels(sample: str, camera: str) -> None:
     # Rays have the digits of float32 only.
     plane = world.surfaces.normal[patch[at]]
     position -= ((position - world.surfaces.corners[patch[at], 0]) * plane).sum(axis=1, keepdims=True) * plane
-    found, told = solved(world).irradiance_at(position, plane)
+    solver = solved(world)
+    found = corrected_irradiance_at(solver, position, plane)
     radiance = (found * world.surfaces.reflectance[patch[at]] / np.pi) @ LUMINANCE_WEIGHTS
     pixels = radiance.reshape(chosen.shape).mean(axis=1)
     expected, scatter = truth.ravel()[whole], noise.ravel()[whole]
-    squared = float(np.sum((pixels - expected) ** 2 - scatter**2)) / float(np.sum(expected**2))
-    assert squared < float(np.mean(told**2))
-    assert squared < 0.025**2
+    squared = ((pixels - expected) ** 2 - scatter**2) / np.sum(expected**2)
+    # One pixel may hold a sliver of a lamp's edge that no ray of the grid sees.
+    assert float(squared.sum() - squared.max()) < 0.01**2
+    assert float(squared.sum()) < 0.025**2

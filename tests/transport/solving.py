@@ -10,6 +10,8 @@ import numpy as np
 
 from solver.engine.world import World
 from solver.geometry.scene import Mesh, Scene, SceneObject
+from solver.illumination.correction import corrected
+from solver.illumination.point_irradiance import PointIrradiance
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 from solver.transport.state import TransportState
@@ -85,6 +87,23 @@ def shelf(two_sided: bool = False) -> World:
             SceneObject("board", Mesh(board, ((0, 1, 2, 3),)), material(0.6, 0.0, two_sided))
         )
     )
+
+
+def irradiance_at(solver: RadiositySolver, positions: Points, normals: FloatArray) -> FloatArray:
+    """(n, 3) irradiance at points anywhere, by the solution as it stands, W/m2."""
+    point = PointIrradiance.of(solver.state, solver.hierarchy, 1e-4)
+    return np.asarray(np.broadcast_to(point.anywhere(positions, normals), (len(positions), 3)))
+
+
+def corrected_irradiance_at(solver: RadiositySolver, positions: Points, normals: FloatArray) -> FloatArray:
+    """As `irradiance_at`, with what the links missed put back."""
+    work = corrected(solver.state, PointIrradiance.of(solver.state, solver.hierarchy))
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            point = PointIrradiance.of(end.value, solver.hierarchy)
+            return np.asarray(np.broadcast_to(point.anywhere(positions, normals), (len(positions), 3)))
 
 
 def leaves_of(state: TransportState) -> BoolArray:
