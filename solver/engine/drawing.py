@@ -96,7 +96,7 @@ class Drawing:
             return np.full(shape, np.nan, dtype=np.float32)
         if renderer is RendererName.INTERPOLANT:
             renderer = RendererName.GOURAUD
-        return self.draw_mesh(world, self._mesh_of(world, field), camera, renderer, layer, samples)
+        return self.draw_mesh(world, self.mesh_of(world, field), camera, renderer, layer, samples)
 
     def draw_mesh(
         self,
@@ -108,24 +108,27 @@ class Drawing:
         samples: int,
     ) -> AnyArray:
         """A layer of `mesh` as `camera` sees it; as `draw`. Raises RenderingUnavailableError."""
-        if self._renderer is None:
-            # A new error, so that no traceback grows on the one that is kept.
-            raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
-        image = self._renderer.draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples)
+        image = self.require_device().draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples)
         return world.scene.luminous_efficacy * image if layer is LayerName.ILLUMINANCE else image
 
     def pixels_by_triangle(self, mesh: InterpolantMesh, camera: Camera) -> FloatArray:
         """How many pixels (t,) of `camera` see each triangle's front. Raises RenderingUnavailableError."""
-        if self._renderer is None:
-            raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
-        shown = self._renderer.draw(mesh, camera, Shading.INTERPOLANT, _LAYERS[LayerName.TRIANGLE], 1)
+        shown = self.require_device().draw(mesh, camera, Shading.INTERPOLANT, _LAYERS[LayerName.TRIANGLE], 1)
         counts = np.bincount(shown.ravel() + 1, minlength=len(mesh.triangles) + 1)[1:]
         patch = mesh.patch[mesh.triangles[:, 0]]
         surfaces = mesh.surfaces
         before = np.einsum("pa,pa->p", camera.eye - surfaces.corners[:, 0], surfaces.normal) > 0.0
         return np.where(before[patch], counts, 0).astype(np.float64)
 
-    def _mesh_of(self, world: World, field: RadiosityField) -> RenderMesh:
+    def require_device(self) -> FrameRenderer:
+        """What draws. Raises RenderingUnavailableError where nothing can."""
+        if self._renderer is None:
+            # A new error, so that no traceback grows on the one that is kept.
+            raise RenderingUnavailableError(self._unavailable.reason if self._unavailable else "no device")
+        return self._renderer
+
+    def mesh_of(self, world: World, field: RadiosityField) -> RenderMesh:
+        """The mesh of a field as gouraud draws it; kept until another field's is asked for."""
         if self._tessellator is None or self._tessellator.surfaces is not world.surfaces:
             self._tessellator, self._mesh = Tessellator(world.surfaces), None
         if self._mesh is None or self._mesh.field is not field:

@@ -28,13 +28,16 @@ from solver.illumination.refinement import ViewError, cells_to_split, view_error
 from solver.illumination.settings import LightSettings
 from solver.illumination.splitting import split_cells
 from solver.illumination.triangulation import Triangulation, triangulate
-from solver.types import FloatArray
+from solver.types import FloatArray, IntArray
 
 KEPT: Final = 4
 """Cameras kept in mind at once; a new one takes the place of the one asked for longest ago."""
 
 _GATHER_ERROR: Final = 0.6
 """Error of point irradiance from a corrected solution, relative to the estimated error of the solution."""
+
+_FIRST: Final = 1e9
+"""More pixels than any camera has."""
 
 
 class FineLight:
@@ -110,6 +113,14 @@ class FineLight:
             self._seen.pop(gone, None)
         if is_new and self._interpolants is not None:
             self._look(self._interpolants)
+            self._is_resting = False
+
+    def build(self, triangles: IntArray) -> None:
+        """Build these triangles (m,) of the interpolants that there are, before all that cameras see."""
+        if self._interpolants is not None:
+            wanted = np.zeros(len(self._interpolants.triangulation.triangles))
+            wanted[triangles] = _FIRST
+            self._interpolants.want(wanted)
             self._is_resting = False
 
     def step(self, budget: float) -> bool:
