@@ -66,7 +66,7 @@ class SessionStatus(BaseModel):
             progress=status.progress,
             error_estimate=status.error_estimate,
             unshot_fraction=status.unshot_fraction,
-            statistics=asdict(status.statistics),
+            statistics=asdict(status.statistics) | asdict(status.fine),
             warnings=list(status.warnings),
             settings=SettingsDocument.describing(status.settings),
         )

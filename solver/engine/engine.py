@@ -17,10 +17,19 @@ from solver.document.limits import SceneLimits
 from solver.engine.drawing import BEST_RENDERER, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
+from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.paths import PathFrames
-from solver.engine.requests import FrameLimits, FrameRequest, LayerName, NotAvailableError, RendererName
+from solver.engine.picking import PickResult, pick_point
+from solver.engine.requests import (
+    CameraChoice,
+    FrameLimits,
+    FrameRequest,
+    LayerName,
+    NotAvailableError,
+    RendererName,
+)
 from solver.engine.solution import Solution
-from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
+from solver.engine.status import Change, ChangeState, EngineStatus, FineStatistics, ProbeResult, SessionState
 from solver.engine.views import (
     Frame,
     GatherView,
@@ -128,6 +137,7 @@ class Engine:
             error_estimate=solution.error_estimate,
             unshot_fraction=solver.unshot_fraction,
             statistics=solver.statistics(),
+            fine=FineStatistics() if self._fine is None else self._fine.statistics(),
             warnings=solution.warnings,
             settings=self._settings,
         )
@@ -164,6 +174,45 @@ class Engine:
             error_estimate=np.where(lit, min(1.0, error), 0.0),
         )
 
+    def pick(self, camera: CameraChoice, x: int, y: int) -> PickResult:
+        """What a frame of `camera` shows in column `x` and row `y`, both from 0 at the top left.
+
+        Raises SceneError naming x or y for a pixel outside the frame, or the camera's field;
+        LimitExceededError, RenderingUnavailableError.
+        """
+        chosen = self._camera(camera)
+        fine = self._fine_light()
+        mesh = None if fine is None else fine.mesh()
+        point = pick_point(self._solution, mesh, self._drawing, chosen, x, y)
+        return PickResult(self._revision, point)
+
+    def is_overlay_ready(self, request: OverlayRequest, complete: bool) -> bool:
+        """Whether an overlay can be shown, and is complete if it is to be; what is missing is worked on.
+
+        Raises NotReadyError where it never can be, SceneError, LimitExceededError,
+        RenderingUnavailableError.
+        """
+        return is_ready(request.overlay, self._subject(request), complete)
+
+    def overlay(self, request: OverlayRequest) -> Work:
+        """Show an overlay that is ready, in slices of a few milliseconds. Raises as `Overlay.show`."""
+        return request.overlay.show(self._subject(request))
+
+    def _subject(self, request: OverlayRequest) -> Subject:
+        return Subject(
+            revision=self._revision,
+            world=self._world,
+            solution=self._solution,
+            drawing=self._drawing,
+            fine=self._fine_light(),
+            camera=self._camera(request.camera),
+        )
+
+    def _camera(self, choice: CameraChoice) -> Camera:
+        camera = choice.resolve(self.scene)
+        self._frame_limits.check(camera, 1)
+        return camera
+
     def _settle(self, world: World, warm_start: Solution | None) -> None:
         """Let light settle in `world`, anew or from `warm_start`."""
         solution = Solution(world, self._settings, warm_start)
@@ -182,9 +231,10 @@ class Engine:
             return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
         fine = self._fine_light()
+        shown = RendererName.GOURAUD if renderer is RendererName.GATHER else renderer
+        view = SolutionView(self._solution, self._drawing, camera, shown, request.layer, request.samples)
         if renderer is RendererName.GATHER:
-            return self._gather_view(fine, camera, request)
-        view = SolutionView(self._solution, self._drawing, camera, renderer, request.layer, request.samples)
+            return self._gather_view(fine, view)
         if renderer is not RendererName.INTERPOLANT:
             return view
         if fine is not None:
@@ -197,18 +247,15 @@ class Engine:
             self._fine = FineLight(self._solution, self._drawing, self._settings)
         return self._fine
 
-    def _gather_view(self, fine: FineLight | None, camera: Camera, request: FrameRequest) -> GatherView:
-        frame = None
-        error = self._solution.error_estimate
-        if fine is not None:
-            point = fine.prepare()
-            error = fine.gather_error
-            if point is not None:
-                if self._gathers is None:
-                    self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
-                frame = self._gathers.ask(camera, request.samples)
-        efficacy = self.scene.luminous_efficacy
-        return GatherView(self._solution, frame, request.layer, error, efficacy)
+    def _gather_view(self, fine: FineLight | None, coarse: SolutionView) -> GatherView:
+        if fine is None:
+            return GatherView(coarse, None, self._solution.error_estimate)
+        point = fine.prepare()
+        if point is None:
+            return GatherView(coarse, None, fine.gather_error)
+        if self._gathers is None:
+            self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
+        return GatherView(coarse, self._gathers.ask(coarse.camera, coarse.samples), fine.gather_error)
 
     def _outlook(self, request: FrameRequest, view: View) -> Outlook:
         return Outlook(

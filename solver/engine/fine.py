@@ -17,6 +17,7 @@ import numpy as np
 from solver.engine.cameras import camera_key
 from solver.engine.drawing import Drawing
 from solver.engine.solution import Solution
+from solver.engine.status import FineStatistics
 from solver.geometry.scene import Camera
 from solver.illumination.cells import Cells
 from solver.illumination.correction import corrected
@@ -54,6 +55,7 @@ class FineLight:
         self._interpolants: Interpolants | None = None
         self._lines: Lines | None = None
         self._point: PointIrradiance | None = None
+        self._evaluations = 0
         self._is_resting = False
         self._is_preparing = False
         self._work = self._run()
@@ -74,6 +76,20 @@ class FineLight:
     def lines(self) -> Lines | None:
         """The discontinuities; None until they have been found."""
         return self._lines
+
+    def statistics(self) -> FineStatistics:
+        """Counts at this moment."""
+        interpolants, lines = self._interpolants, self._lines
+        told = None if lines is None else lines.activation.statistics
+        return FineStatistics(
+            discontinuities=0 if told is None else told.found,
+            discontinuities_active=0 if told is None else told.active,
+            discontinuities_weak=0 if told is None else told.dropped_by_weight,
+            discontinuities_crowded=0 if told is None else told.dropped_by_limit,
+            triangles=0 if interpolants is None else len(interpolants.triangulation.triangles),
+            interpolants=0 if interpolants is None else int(interpolants.is_fine.sum()),
+            point_irradiances=self._evaluations + (0 if interpolants is None else interpolants.evaluations),
+        )
 
     def mesh(self) -> InterpolantMesh | None:
         """What to draw; None until there is anything."""
@@ -154,6 +170,8 @@ class FineLight:
             interpolants = Interpolants(
                 point, state.tree.leaves, cells, triangulation, field.irradiance, self._interpolants
             )
+            if self._interpolants is not None:
+                self._evaluations += self._interpolants.evaluations
             self._interpolants = interpolants
             self._look(interpolants)
             yield

@@ -56,6 +56,9 @@ class GatherFrame:
         self._todo: IntArray = seen[eye_side > 0.0].astype(np.int32)
         self._world, self._field, self._point = world, field, point
         self._irradiance = np.zeros((len(self._leaf), 3))
+        # Until a pixel has its own, it has the solution's.
+        at = point.tree.leaves[self._leaf[self._todo]]
+        self._irradiance[self._todo] = np.maximum(point.solved(self._position[self._todo], at), 0.0)
         self.done = 0
         self._work = self._run()
 

@@ -33,6 +33,25 @@ class ChangeState(StrEnum):
 
 
 @dataclass(frozen=True)
+class FineStatistics:
+    """Counts of what has been built on the solution; 0 until somebody looks."""
+
+    discontinuities: int = 0
+    """Found"""
+    discontinuities_active: int = 0
+    """Meshed"""
+    discontinuities_weak: int = 0
+    """Left out since they hardly show"""
+    discontinuities_crowded: int = 0
+    """Left out since a leaf on their way has all that it may have"""
+    triangles: int = 0
+    interpolants: int = 0
+    """Triangles whose samples are point irradiances"""
+    point_irradiances: int = 0
+    """Computed so far"""
+
+
+@dataclass(frozen=True)
 class EngineStatus:
     """One moment of an engine."""
 
@@ -47,6 +66,7 @@ class EngineStatus:
     unshot_fraction: float
     """Share of the radiosity that has been received and not yet passed on."""
     statistics: SolverStatistics
+    fine: FineStatistics
     warnings: tuple[str, ...]
     settings: LightSettings
 

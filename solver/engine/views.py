@@ -177,12 +177,11 @@ class InterpolantView:
 class GatherView:
     """A frame gathered pixel by pixel from a solution at rest."""
 
-    solution: Solution
+    coarse: SolutionView
+    """What is shown where time is up before there is anything else"""
     frame: GatherFrame | None
     """None while the solution is worked on"""
-    layer: LayerName
     error: float
-    luminous_efficacy: float
 
     @property
     def drawable(self) -> bool:
@@ -197,24 +196,26 @@ class GatherView:
     @property
     def converged(self) -> bool:
         """Whether the solution is, and the frame is complete."""
-        return self.solution.state is SessionState.CONVERGED and self.drawable
+        return self.coarse.converged and self.drawable
 
     @property
     def improving(self) -> bool:
         """Until it is complete."""
-        return not self.drawable and self.solution.state is not SessionState.FAILED
+        return not self.drawable and self.coarse.solution.state is not SessionState.FAILED
 
     @property
     def version(self) -> str:
         """Of the field, and the pixels done."""
-        return f"{self.solution.version}.{0 if self.frame is None else self.frame.done}"
+        return f"{self.coarse.version}.{0 if self.frame is None else self.frame.done}"
 
     def draw(self) -> AnyArray:
-        """The picture, (h, w, 3), or (h, w) lux."""
-        assert self.frame is not None
-        image = self.frame.image(self.layer)
-        if self.layer is LayerName.ILLUMINANCE:
-            return self.luminous_efficacy * (image @ LUMINANCE_WEIGHTS.astype(np.float32))
+        """The picture, (h, w, 3), or (h, w) lux. Raises RenderingUnavailableError."""
+        if self.frame is None:
+            return self.coarse.draw()
+        image = self.frame.image(self.coarse.layer)
+        if self.coarse.layer is LayerName.ILLUMINANCE:
+            efficacy = self.coarse.solution.world.scene.luminous_efficacy
+            return efficacy * (image @ LUMINANCE_WEIGHTS.astype(np.float32))
         return image
 
 

@@ -28,6 +28,7 @@ from solver.engine.requests import (
 )
 from solver.engine.world import World
 from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
+from solver.illumination.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
 from solver.pathtracing import PathTracer
 from solver.rendering.encoding import LinearFormat, PictureFormat
@@ -76,6 +77,7 @@ def warm_steps(drawing: Drawing) -> tuple[WarmStep, ...]:
         WarmStep("edit and probe", lambda: _edit(drawing)),
         WarmStep("mesh", _mesh),
         WarmStep("draw", lambda: _draw(drawing)),
+        WarmStep("follow links", _follow_links),
         WarmStep("encode", _encode),
         WarmStep("trace paths", _trace),
     )
@@ -161,10 +163,21 @@ def _mesh() -> None:
 def _draw(drawing: Drawing) -> None:
     if drawing.problem is not None:
         return
-    engine = Engine(_room(_RED, _WARM_LIGHT, range(5)), _SETTINGS, drawing=drawing)
-    _run(engine)
-    for request in _drawable(drawing):
-        engine.frame(request)
+    for scene in (_room(_RED, _WARM_LIGHT, range(5)), _room(_GREY, _LIGHT, range(6))):
+        engine = Engine(scene, _SETTINGS, drawing=drawing)
+        _run(engine)
+        for request in _drawable(drawing):
+            engine.outlook(request)
+            _run(engine)
+            engine.frame(request)
+
+
+def _follow_links() -> None:
+    """Point irradiance over links, as scenes of many patches have it."""
+    _, solver = _solve(_room(_RED, _WARM_LIGHT, range(5)))
+    point = PointIrradiance.of(solver.state, solver.hierarchy, few=0)
+    leaves = solver.state.tree.leaves
+    point.at(solver.state.tree.centroid[leaves], leaves)
 
 
 def _drawable(drawing: Drawing) -> Iterator[FrameRequest]:

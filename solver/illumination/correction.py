@@ -75,7 +75,7 @@ def _defects(state: TransportState, point: PointIrradiance, told: Spectra) -> Ge
         yield
     found = exact.reshape(-1, each, state.channels).mean(axis=1) - told[chosen]
     if len(asked) == len(leaves):
-        return found
+        return np.asarray(found)
     patch, area = tree.patch, tree.area
     share = _ratio(
         _by_patch(tree.patch_count, patch[chosen], area[chosen], found),
