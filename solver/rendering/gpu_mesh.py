@@ -60,25 +60,7 @@ class GpuMesh:
 
     def buffer(self, name: str, array: AnyArray) -> moderngl.Buffer:
         """The buffer of that name, with `array` in it."""
-        return self.derived(name, (array,), lambda: array).buffer
-
-    def derived(self, name: str, sources: tuple[object, ...], make: Callable[[], AnyArray]) -> _Kept:
-        """The buffer of that name, with what `make` makes of `sources` in it."""
-        kept = self._kept.get(name)
-        if kept is not None and _are_same(kept.sources, sources):
-            return kept
-        data = np.ascontiguousarray(make())
-        self.uploaded += data.nbytes
-        if kept is not None and kept.buffer.size == data.nbytes:
-            kept.buffer.write(data)
-            kept.sources = sources
-            return kept
-        if kept is not None:
-            self._release_vertex_arrays()
-            self._release(kept)
-        made = self._context.buffer(data if data.size else bytes(_SMALLEST))
-        self._kept[name] = _Kept(made, sources)
-        return self._kept[name]
+        return self._derived(name, (array,), lambda: array).buffer
 
     def use_texels(
         self,
@@ -88,8 +70,11 @@ class GpuMesh:
         sources: tuple[object, ...],
         make: Callable[[], AnyArray],
     ) -> None:
-        """As `derived`, given to shaders as texels at `unit`. Raises LimitExceededError for too many."""
-        kept = self.derived(name, sources, make)
+        """Let shaders find what `make` makes of `sources` as texels at `unit`; it is kept under `name`.
+
+        Raises LimitExceededError for more texels than the device takes.
+        """
+        kept = self._derived(name, sources, make)
         if kept.texels is None:
             if kept.buffer.size > _TEXEL_BYTES * self._calls.most_texels:
                 raise LimitExceededError(
@@ -114,7 +99,7 @@ class GpuMesh:
         """Local coordinates, three float32 a vertex."""
         mesh = self.mesh
         sources = (mesh.position, mesh.surfaces)
-        return self.derived("position", sources, lambda: local_positions(mesh).astype(np.float32)).buffer
+        return self._derived("position", sources, lambda: local_positions(mesh).astype(np.float32)).buffer
 
     def patches(self) -> moderngl.Buffer:
         """Patches of vertices, int32."""
@@ -131,7 +116,7 @@ class GpuMesh:
         if isinstance(mesh, RenderMesh):
             return self.buffer(name, mesh.leaf_radiance if is_radiance else mesh.leaf_irradiance)
         sources = (mesh.leaf_irradiance, mesh.leaf, mesh.triangles, mesh.patch, mesh.surfaces)
-        return self.derived(
+        return self._derived(
             name,
             sources,
             lambda: (leaf_radiance(mesh) if is_radiance else mesh.leaf_irradiance).astype(np.float32),
@@ -143,7 +128,7 @@ class GpuMesh:
         if self._eye is None or not np.array_equal(self._eye, eye):
             self._eye = eye.copy()
         # The copy stands for the eye: it is another object only where the eye is another.
-        return self.derived("facings", (surfaces, self._eye), lambda: facings(surfaces, eye)).buffer
+        return self._derived("facings", (surfaces, self._eye), lambda: facings(surfaces, eye)).buffer
 
     def release(self) -> None:
         """Give all back; the context must be current."""
@@ -151,6 +136,24 @@ class GpuMesh:
         for kept in self._kept.values():
             self._release(kept)
         self._kept.clear()
+
+    def _derived(self, name: str, sources: tuple[object, ...], make: Callable[[], AnyArray]) -> _Kept:
+        """The buffer of that name, with what `make` makes of `sources` in it."""
+        kept = self._kept.get(name)
+        if kept is not None and _are_same(kept.sources, sources):
+            return kept
+        data = np.ascontiguousarray(make())
+        self.uploaded += data.nbytes
+        if kept is not None and kept.buffer.size == data.nbytes:
+            kept.buffer.write(data)
+            kept.sources = sources
+            return kept
+        if kept is not None:
+            self._release_vertex_arrays()
+            self._release(self._kept.pop(name))
+        made = self._context.buffer(data if data.size else bytes(_SMALLEST))
+        self._kept[name] = _Kept(made, sources)
+        return self._kept[name]
 
     def _release(self, kept: _Kept) -> None:
         if kept.texels is not None:
