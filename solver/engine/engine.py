@@ -126,6 +126,11 @@ class Engine:
         solving = self._solution.step(0.5 * budget if tracing else budget)
         return solving or refining or gathering or tracing
 
+    def build_everything(self) -> None:
+        """Build the interpolants of all triangles, seen or not, once there are any."""
+        if self._fine is not None and self._fine.interpolants is not None:
+            self._fine.build(np.arange(len(self._fine.interpolants.triangulation.triangles), dtype=np.int32))
+
     def status(self) -> EngineStatus:
         """How the session stands."""
         solution, solver = self._solution, self._solution.solver
