@@ -65,6 +65,15 @@ def activate(
 
 
 @kernel
+def _holds(held: IntArray, used: IntArray, leaf: int, line: int) -> bool:
+    """Whether a leaf holds a set."""
+    found = False
+    for k in range(used[leaf]):
+        found = found or held[leaf, k] == line
+    return found
+
+
+@kernel
 def _activate(
     order: Int64Array,
     member: IntArray,
@@ -91,12 +100,3 @@ def _activate(
             if not _holds(held, used, there, member[i]):
                 held[there, used[there]] = member[i]
                 used[there] += 1
-
-
-@kernel
-def _holds(held: IntArray, used: IntArray, leaf: int, line: int) -> bool:
-    """Whether a leaf holds a set."""
-    found = False
-    for k in range(used[leaf]):
-        found = found or held[leaf, k] == line
-    return found

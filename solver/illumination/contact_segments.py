@@ -32,75 +32,6 @@ _SLAB: Final = 2.0
 
 
 @kernel
-def find_contacts(
-    polygons: Polygons,
-    outlines: Outlines,
-    low: FloatArray,
-    high: FloatArray,
-    skip: IntArray,
-    leaf_first: IntArray,
-    leaf_count: IntArray,
-    order: IntArray,
-    receivers: IntArray,
-    tolerance: float,
-    begin: int,
-    rows: FloatArray,
-    ids: IntArray,
-) -> tuple[int, int]:
-    """Write the contacts of the receivers from `begin` on to rows (m, FIELDS), ids (m, 4).
-
-    The hierarchy's arrays are those of `Hierarchy`; tolerance in metres. Returns the number of rows
-    written and the receiver at which they were full.
-    """
-    planes = np.empty((5, 4))
-    slab = np.empty((6, 4))
-    candidates = np.empty(len(order), dtype=np.int32)
-    taken = np.full(len(outlines.ends), -1, dtype=np.int32)
-    segment = np.empty((2, 3))
-    used = 0
-    for i in range(begin, len(receivers)):
-        r = receivers[i]
-        before = used
-        sides = receiver_planes(polygons, r, planes)
-        size = patch_diameter(polygons, r)
-        o = polygons.corners[r, 0]
-        normal = polygons.normals[r]
-        slab_count = _slab_planes(planes, sides, o, tolerance, slab)
-        found = walk_hierarchy(
-            low, high, skip, leaf_first, leaf_count, order, slab, slab_count, tolerance, candidates
-        )
-        for entry in range(found):
-            c = candidates[entry]
-            if c == r:
-                continue
-            lowest, highest = heights(polygons.corners[c], polygons.counts[c], o, normal)
-            if lowest < -tolerance and highest > tolerance:
-                # It crosses the receiver's plane.
-                if not cross_plane(polygons, c, o, normal, segment):
-                    continue
-                for end in range(2):
-                    for axis in range(3):
-                        segment[end, axis] -= o[axis]
-                if used == len(rows):
-                    return before, i
-                used += _write_contact(polygons, r, c, planes, sides, size, segment, used, rows, ids)
-                continue
-            # Or some of its edges lie on it.
-            for k in range(polygons.counts[c]):
-                e = outlines.edge[c, k]
-                if e < 0 or taken[e] == i or not _touches(outlines, e, o, normal, tolerance):
-                    continue
-                taken[e] = i
-                for end in range(2):
-                    for axis in range(3):
-                        segment[end, axis] = outlines.point[outlines.ends[e, end], axis] - o[axis]
-                if used == len(rows):
-                    return before, i
-                used += _write_contact(polygons, r, c, planes, sides, size, segment, used, rows, ids)
-    return used, len(receivers)
-
-
-@kernel
 def _slab_planes(planes: FloatArray, sides: int, o: FloatArray, tolerance: float, slab: FloatArray) -> int:
     """Planes (a, b, c, d), inside where ax + by + cz >= d in the world, of what may touch the receiver."""
     for k in range(2 + sides):
@@ -193,3 +124,72 @@ def _write_contact(
         rows[used, 7 + SAMPLES + sample] = 0.0
         rows[used, 7 + 2 * SAMPLES + sample] = math.inf
     return 1
+
+
+@kernel
+def find_contacts(
+    polygons: Polygons,
+    outlines: Outlines,
+    low: FloatArray,
+    high: FloatArray,
+    skip: IntArray,
+    leaf_first: IntArray,
+    leaf_count: IntArray,
+    order: IntArray,
+    receivers: IntArray,
+    tolerance: float,
+    begin: int,
+    rows: FloatArray,
+    ids: IntArray,
+) -> tuple[int, int]:
+    """Write the contacts of the receivers from `begin` on to rows (m, FIELDS), ids (m, 4).
+
+    The hierarchy's arrays are those of `Hierarchy`; tolerance in metres. Returns the number of rows
+    written and the receiver at which they were full.
+    """
+    planes = np.empty((5, 4))
+    slab = np.empty((6, 4))
+    candidates = np.empty(len(order), dtype=np.int32)
+    taken = np.full(len(outlines.ends), -1, dtype=np.int32)
+    segment = np.empty((2, 3))
+    used = 0
+    for i in range(begin, len(receivers)):
+        r = receivers[i]
+        before = used
+        sides = receiver_planes(polygons, r, planes)
+        size = patch_diameter(polygons, r)
+        o = polygons.corners[r, 0]
+        normal = polygons.normals[r]
+        slab_count = _slab_planes(planes, sides, o, tolerance, slab)
+        found = walk_hierarchy(
+            low, high, skip, leaf_first, leaf_count, order, slab, slab_count, tolerance, candidates
+        )
+        for entry in range(found):
+            c = candidates[entry]
+            if c == r:
+                continue
+            lowest, highest = heights(polygons.corners[c], polygons.counts[c], o, normal)
+            if lowest < -tolerance and highest > tolerance:
+                # It crosses the receiver's plane.
+                if not cross_plane(polygons, c, o, normal, segment):
+                    continue
+                for end in range(2):
+                    for axis in range(3):
+                        segment[end, axis] -= o[axis]
+                if used == len(rows):
+                    return before, i
+                used += _write_contact(polygons, r, c, planes, sides, size, segment, used, rows, ids)
+                continue
+            # Or some of its edges lie on it.
+            for k in range(polygons.counts[c]):
+                e = outlines.edge[c, k]
+                if e < 0 or taken[e] == i or not _touches(outlines, e, o, normal, tolerance):
+                    continue
+                taken[e] = i
+                for end in range(2):
+                    for axis in range(3):
+                        segment[end, axis] = outlines.point[outlines.ends[e, end], axis] - o[axis]
+                if used == len(rows):
+                    return before, i
+                used += _write_contact(polygons, r, c, planes, sides, size, segment, used, rows, ids)
+    return used, len(receivers)

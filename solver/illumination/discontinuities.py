@@ -41,6 +41,7 @@ from solver.illumination.segments import (
     SAMPLES,
     VE,
     Polygons,
+    polygons_of,
 )
 from solver.illumination.shadow_segments import cast_shadows
 from solver.parallel import run_chunks
@@ -56,8 +57,8 @@ BEND: Final = 0.0189
 
 _SIMPSON: Final = np.array([1.0, 4.0, 1.0]) / 6.0
 
-_CHUNK: Final = 128
-_LEAST: Final = 4
+_CHUNK: Final = 16
+_LEAST: Final = 1
 _ROOM: Final = 4096
 
 KINDS: Final = {VE: "VE", EV: "EV", HORIZON: "horizon", CONTACT: "contact", GRAZE: "graze"}
@@ -182,7 +183,7 @@ class _Scene:
             surfaces,
             hierarchy,
             find_outlines(surfaces) if outlines is None else outlines,
-            Polygons(surfaces.corners, surfaces.corner_count, surfaces.normal, surfaces.area),
+            polygons_of(surfaces),
             tolerances.SIDE * surfaces.size,
         )
 

@@ -43,73 +43,6 @@ _LINES: Final = 8
 
 
 @kernel
-def find_grazes(
-    polygons: Polygons,
-    outlines: Outlines,
-    receivers: IntArray,
-    sources: IntArray,
-    blocker_count: IntArray,
-    pool: IntArray,
-    tolerance: float,
-    rows: FloatArray,
-    ids: IntArray,
-) -> int:
-    """Write the grazing discontinuities of n pairs to rows (>= blockers, FIELDS), ids (>= blockers, 4).
-
-    pool holds the pairs' blockers one after the other; tolerance in metres. Returns the number of rows
-    written.
-    """
-    planes = np.empty((5, 4))
-    segment, line, across = np.empty((3, 2, 3))
-    used = 0
-    first = 0
-    for pair in range(len(receivers)):
-        r = receivers[pair]
-        s = sources[pair]
-        sides = receiver_planes(polygons, r, planes)
-        size = patch_diameter(polygons, r)
-        o = polygons.corners[r, 0]
-        for entry in range(first, first + blocker_count[pair]):
-            c = pool[entry]
-            nc = polygons.normals[c]
-            at = polygons.corners[c, 0]
-            low, high = heights(polygons.corners[s], polygons.counts[s], at, nc)
-            if low >= -tolerance or high <= tolerance:
-                continue
-            low, high = heights(polygons.corners[r], polygons.counts[r], at, nc)
-            if low >= -tolerance or high <= tolerance:
-                continue
-            # The lines in which the polygon's plane meets the receiver and the source.
-            if not cross_plane(polygons, s, at, nc, across) or not cross_plane(polygons, r, at, nc, line):
-                continue
-            if not _in_front(across, o, planes, tolerance):
-                continue
-            t0, t1 = _shaded_part(polygons, r, s, c, planes, line, across, tolerance)
-            if t0 >= t1:
-                continue
-            for axis in range(3):
-                step = line[1, axis] - line[0, axis]
-                segment[0, axis] = line[0, axis] + t0 * step - o[axis]
-                segment[1, axis] = line[0, axis] + t1 * step - o[axis]
-            if not counts_as_segment(planes, sides, segment, size):
-                continue
-            write_segment(polygons, r, s, c, GRAZE, segment, used, rows, ids)
-            rows[used, 6] = 1.0
-            open_sheet = _is_open(outlines, c, polygons.counts[c])
-            for sample in range(SAMPLES):
-                t = t0 + (t1 - t0) * sample / (SAMPLES - 1.0)
-                x = line[0] + t * (line[1] - line[0])
-                factor, width = _graze_strength(polygons, r, s, c, x, across, tolerance)
-                rows[used, 7 + sample] = factor
-                # Of an open sheet one side hides as much as the other.
-                rows[used, 7 + SAMPLES + sample] = 0.5 * width if open_sheet else width
-                rows[used, 7 + 2 * SAMPLES + sample] = math.inf
-            used += 1
-        first += blocker_count[pair]
-    return used
-
-
-@kernel
 def _is_open(outlines: Outlines, c: int, count: int) -> bool:
     """Whether a patch has an edge that bounds no other."""
     for k in range(count):
@@ -133,6 +66,24 @@ def _in_front(segment: FloatArray, o: FloatArray, planes: FloatArray, tolerance:
         segment[0, axis] = a + t0 * step
         segment[1, axis] = a + t1 * step
     return True
+
+
+@kernel
+def _reach(
+    wedge: FloatArray, planes: FloatArray, o: FloatArray, is_ev: bool, line: FloatArray, reached: FloatArray
+) -> None:
+    """Widen reached (2,) to where on a line (2, 3) the lines through apex and base's ends of a wedge lead."""
+    x = np.empty(3)
+    for end in range(2):
+        meet_receiver(wedge, float(end), planes, o, is_ev, x)
+        t = 0.0
+        square = 0.0
+        for axis in range(3):
+            step = line[1, axis] - line[0, axis]
+            t += (x[axis] + o[axis] - line[0, axis]) * step
+            square += step * step
+        reached[0] = min(reached[0], t / square)
+        reached[1] = max(reached[1], t / square)
 
 
 @kernel
@@ -182,24 +133,6 @@ def _shaded_part(
                 wedge[2, axis] = across[0, axis] + t1 * step
             _reach(wedge, planes, o, True, line, reached)
     return max(0.0, reached[0]), min(1.0, reached[1])
-
-
-@kernel
-def _reach(
-    wedge: FloatArray, planes: FloatArray, o: FloatArray, is_ev: bool, line: FloatArray, reached: FloatArray
-) -> None:
-    """Widen reached (2,) to where on a line (2, 3) the lines through apex and base's ends of a wedge lead."""
-    x = np.empty(3)
-    for end in range(2):
-        meet_receiver(wedge, float(end), planes, o, is_ev, x)
-        t = 0.0
-        square = 0.0
-        for axis in range(3):
-            step = line[1, axis] - line[0, axis]
-            t += (x[axis] + o[axis] - line[0, axis]) * step
-            square += step * step
-        reached[0] = min(reached[0], t / square)
-        reached[1] = max(reached[1], t / square)
 
 
 @kernel
@@ -264,3 +197,70 @@ def _graze_strength(
     cosine_s = nc[0] * ns[0] + nc[1] * ns[1] + nc[2] * ns[2]
     slope = total * math.sqrt(max(0.0, 1.0 - cosine_r * cosine_r) / max(tolerance, 1.0 - cosine_s * cosine_s))
     return factor, factor / slope if slope > 0.0 else math.inf
+
+
+@kernel
+def find_grazes(
+    polygons: Polygons,
+    outlines: Outlines,
+    receivers: IntArray,
+    sources: IntArray,
+    blocker_count: IntArray,
+    pool: IntArray,
+    tolerance: float,
+    rows: FloatArray,
+    ids: IntArray,
+) -> int:
+    """Write the grazing discontinuities of n pairs to rows (>= blockers, FIELDS), ids (>= blockers, 4).
+
+    pool holds the pairs' blockers one after the other; tolerance in metres. Returns the number of rows
+    written.
+    """
+    planes = np.empty((5, 4))
+    segment, line, across = np.empty((3, 2, 3))
+    used = 0
+    first = 0
+    for pair in range(len(receivers)):
+        r = receivers[pair]
+        s = sources[pair]
+        sides = receiver_planes(polygons, r, planes)
+        size = patch_diameter(polygons, r)
+        o = polygons.corners[r, 0]
+        for entry in range(first, first + blocker_count[pair]):
+            c = pool[entry]
+            nc = polygons.normals[c]
+            at = polygons.corners[c, 0]
+            low, high = heights(polygons.corners[s], polygons.counts[s], at, nc)
+            if low >= -tolerance or high <= tolerance:
+                continue
+            low, high = heights(polygons.corners[r], polygons.counts[r], at, nc)
+            if low >= -tolerance or high <= tolerance:
+                continue
+            # The lines in which the polygon's plane meets the receiver and the source.
+            if not cross_plane(polygons, s, at, nc, across) or not cross_plane(polygons, r, at, nc, line):
+                continue
+            if not _in_front(across, o, planes, tolerance):
+                continue
+            t0, t1 = _shaded_part(polygons, r, s, c, planes, line, across, tolerance)
+            if t0 >= t1:
+                continue
+            for axis in range(3):
+                step = line[1, axis] - line[0, axis]
+                segment[0, axis] = line[0, axis] + t0 * step - o[axis]
+                segment[1, axis] = line[0, axis] + t1 * step - o[axis]
+            if not counts_as_segment(planes, sides, segment, size):
+                continue
+            write_segment(polygons, r, s, c, GRAZE, segment, used, rows, ids)
+            rows[used, 6] = 1.0
+            open_sheet = _is_open(outlines, c, polygons.counts[c])
+            for sample in range(SAMPLES):
+                t = t0 + (t1 - t0) * sample / (SAMPLES - 1.0)
+                x = line[0] + t * (line[1] - line[0])
+                factor, width = _graze_strength(polygons, r, s, c, x, across, tolerance)
+                rows[used, 7 + sample] = factor
+                # Of an open sheet one side hides as much as the other.
+                rows[used, 7 + SAMPLES + sample] = 0.5 * width if open_sheet else width
+                rows[used, 7 + 2 * SAMPLES + sample] = math.inf
+            used += 1
+        first += blocker_count[pair]
+    return used

@@ -156,6 +156,39 @@ def _fill_cells(
 
 
 @kernel
+def _width_if_crossed(leaf: FloatArray, n: int, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Extent of a leaf (4, 2) across a segment that passes through it, m; -1 if it does not."""
+    dx = x1 - x0
+    dy = y1 - y0
+    length = math.sqrt(dx * dx + dy * dy)
+    lowest = math.inf
+    highest = -math.inf
+    size = 0.0
+    for k in range(n):
+        across = (dx * (leaf[k, 1] - y0) - dy * (leaf[k, 0] - x0)) / length
+        lowest = min(lowest, across)
+        highest = max(highest, across)
+        opposite = (k + 2) % n
+        size = max(size, math.hypot(leaf[opposite, 0] - leaf[k, 0], leaf[opposite, 1] - leaf[k, 1]))
+    inset = LEAF_BORDER * size
+    if lowest >= -inset or highest <= inset:
+        return -1.0
+    t0 = 0.0
+    t1 = 1.0
+    for k in range(n):
+        m = (k + 1) % n
+        ex = leaf[m, 0] - leaf[k, 0]
+        ey = leaf[m, 1] - leaf[k, 1]
+        edge = math.sqrt(ex * ex + ey * ey)
+        g0 = (ex * (y0 - leaf[k, 1]) - ey * (x0 - leaf[k, 0])) / edge - inset
+        g1 = (ex * (y1 - leaf[k, 1]) - ey * (x1 - leaf[k, 0])) / edge - inset
+        t0, t1 = clip(g0, g1, t0, t1)
+    if (t1 - t0) * length <= inset:
+        return -1.0
+    return highest - lowest
+
+
+@kernel
 def _cross(
     segment: FloatArray,
     patch: IntArray,
@@ -212,36 +245,3 @@ def _cross(
                     found += 1
         if not write:
             slot[i] = found
-
-
-@kernel
-def _width_if_crossed(leaf: FloatArray, n: int, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Extent of a leaf (4, 2) across a segment that passes through it, m; -1 if it does not."""
-    dx = x1 - x0
-    dy = y1 - y0
-    length = math.sqrt(dx * dx + dy * dy)
-    lowest = math.inf
-    highest = -math.inf
-    size = 0.0
-    for k in range(n):
-        across = (dx * (leaf[k, 1] - y0) - dy * (leaf[k, 0] - x0)) / length
-        lowest = min(lowest, across)
-        highest = max(highest, across)
-        opposite = (k + 2) % n
-        size = max(size, math.hypot(leaf[opposite, 0] - leaf[k, 0], leaf[opposite, 1] - leaf[k, 1]))
-    inset = LEAF_BORDER * size
-    if lowest >= -inset or highest <= inset:
-        return -1.0
-    t0 = 0.0
-    t1 = 1.0
-    for k in range(n):
-        m = (k + 1) % n
-        ex = leaf[m, 0] - leaf[k, 0]
-        ey = leaf[m, 1] - leaf[k, 1]
-        edge = math.sqrt(ex * ex + ey * ey)
-        g0 = (ex * (y0 - leaf[k, 1]) - ey * (x0 - leaf[k, 0])) / edge - inset
-        g1 = (ex * (y1 - leaf[k, 1]) - ey * (x1 - leaf[k, 0])) / edge - inset
-        t0, t1 = clip(g0, g1, t0, t1)
-    if (t1 - t0) * length <= inset:
-        return -1.0
-    return highest - lowest

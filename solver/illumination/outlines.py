@@ -41,8 +41,6 @@ class Outlines(NamedTuple):
     """(e,) whether it only parts two patches of one flat face of one object"""
     sheet_start: IntArray
     """(e + 1,) first sheet of each edge"""
-    sheet_patch: IntArray
-    """(s,)"""
     sheet_normal: FloatArray
     """(s, 3) unit normal of each sheet, turned so that the sheet is on the left of its edge"""
     spoke_start: IntArray
@@ -100,7 +98,6 @@ def find_outlines(surfaces: Surfaces) -> Outlines:
         is_flat=is_flat,
         is_inner=is_inner,
         sheet_start=sheet_start,
-        sheet_patch=owner,
         sheet_normal=normal,
         spoke_start=_starts(spoke_of, len(point)),
         spoke=spoke,

@@ -11,8 +11,11 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
 from solver.kernels import inline_kernel, kernel
-from solver.types import Corners, FloatArray, IntArray
+from solver.types import Corners, FloatArray, IntArray, Points
 
 VE: Final = 0
 EV: Final = 1
@@ -50,6 +53,21 @@ class Polygons(NamedTuple):
     """(p, 3)"""
     areas: FloatArray
     """(p,) m2"""
+    middles: Points
+    """(p, 3) mean of the corners, metres"""
+    radii: FloatArray
+    """(p,) distance of the farthest corner from the middle, m"""
+
+
+def polygons_of(surfaces: Surfaces) -> Polygons:
+    """The patches of `surfaces`."""
+    is_corner = np.arange(4) < surfaces.corner_count[:, None]
+    middles = (surfaces.corners * is_corner[:, :, None]).sum(axis=1) / surfaces.corner_count[:, None]
+    reach = np.linalg.norm(surfaces.corners - middles[:, None], axis=2)
+    return Polygons(
+        surfaces.corners, surfaces.corner_count, surfaces.normal, surfaces.area, middles,
+        reach.max(axis=1, initial=0.0),
+    )  # fmt: skip
 
 
 @kernel

@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.discontinuities import Discontinuities
+from solver.illumination.segments import polygons_of
 from solver.kernels import kernel
 from solver.transport.elements import plane_axes
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
@@ -101,7 +102,9 @@ class DiscontinuitySets:
 def group_discontinuities(surfaces: Surfaces, discontinuities: Discontinuities) -> DiscontinuitySets:
     """The sets of all `discontinuities`."""
     d = discontinuities
-    middle, size = _middles(surfaces)
+    middle = polygons_of(surfaces).middles
+    apart = surfaces.corners[:, :, None] - surfaces.corners[:, None]
+    size = np.linalg.norm(apart, axis=-1).max(axis=(1, 2), initial=0.0)
     axes = plane_axes(surfaces.normal)
     local = d.ends - middle[d.receiver][:, None]
     flat = np.einsum("dek,dak->dea", local, axes[d.receiver]) / size[d.receiver, None, None]
@@ -131,14 +134,6 @@ def group_discontinuities(surfaces: Surfaces, discontinuities: Discontinuities) 
         span=np.sort(span, axis=1),
         jump=d.jump,
     )
-
-
-def _middles(surfaces: Surfaces) -> tuple[Points, FloatArray]:
-    """Mean of the corners (p, 3) and diameter (p,) of each patch."""
-    is_corner = np.arange(4) < surfaces.corner_count[:, None]
-    middle = (surfaces.corners * is_corner[:, :, None]).sum(axis=1) / surfaces.corner_count[:, None]
-    apart = surfaces.corners[:, :, None] - surfaces.corners[:, None]
-    return middle, np.linalg.norm(apart, axis=-1).max(axis=(1, 2))
 
 
 def _grouped(owner: IntArray, value: FloatArray) -> IntArray:

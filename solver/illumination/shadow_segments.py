@@ -43,6 +43,93 @@ _NARROWEST: Final = 1e-9
 
 
 @kernel
+def _write_parts(
+    polygons: Polygons,
+    outlines: Outlines,
+    r: int,
+    s: int,
+    blocker: int,
+    is_ev: bool,
+    cast_by: int,
+    wedge: FloatArray,
+    planes: FloatArray,
+    sides: int,
+    size: float,
+    rays: FloatArray,
+    ray_count: int,
+    cuts: FloatArray,
+    cut_count: int,
+    reach: float,
+    pool: IntArray,
+    first: int,
+    count: int,
+    tolerance: float,
+    keep_hidden: bool,
+    hidden: FloatArray,
+    parts: FloatArray,
+    rows: FloatArray,
+    ids: IntArray,
+    used: int,
+) -> int:
+    """Write the free parts of a wedge (3, 3) of apex and base, with their strengths, as rows from `used` on.
+
+    Returns how many rows are used then, or -1 if they are full.
+    """
+    segment = np.empty((2, 3))
+    o = polygons.corners[r, 0]
+    for end in range(2):
+        meet_receiver(wedge, float(end), planes, o, is_ev, segment[end])
+    if not counts_as_segment(planes, sides, segment, size):
+        return used
+    normal = np.empty(3)
+    if not wedge_normal(wedge, normal):
+        return used
+    free = 1
+    parts[0, 0] = 0.0
+    parts[0, 1] = 1.0
+    if not keep_hidden:
+        free = free_parts(
+            polygons, outlines, wedge, normal, is_ev, cast_by, r, s, pool, first, count, tolerance, hidden,
+            parts,
+        )  # fmt: skip
+    scratch = np.empty((8, 3))
+    x, b, source_point = np.empty((3, 3))
+    for part in range(free):
+        u0 = parts[part, 0]
+        u1 = parts[part, 1]
+        w0 = meet_receiver(wedge, u0, planes, o, is_ev, segment[0])
+        w1 = meet_receiver(wedge, u1, planes, o, is_ev, segment[1])
+        if not counts_as_segment(planes, sides, segment, size):
+            continue
+        if used == len(rows):
+            return -1
+        write_segment(polygons, r, s, blocker, EV if is_ev else VE, segment, used, rows, ids)
+        rows[used, 6] = 0.0
+        for sample in range(SAMPLES):
+            # The middle of the segment is not that of the base: the base is seen in perspective.
+            u = u0 if sample == 0 else u1
+            if sample == 1:
+                u = u0 + (u1 - u0) * w0 / (w0 + w1)
+            meet_receiver(wedge, u, planes, o, is_ev, x)
+            for axis in range(3):
+                x[axis] += o[axis]
+                base = wedge[1, axis] + u * (wedge[2, axis] - wedge[1, axis])
+                b[axis] = wedge[0, axis] if is_ev else base
+                source_point[axis] = base if is_ev else wedge[0, axis]
+            ratio, factor, width, bend = wedge_strength(
+                polygons, r, s, x, b, source_point, normal, rays, ray_count, cuts, cut_count, reach,
+                tolerance, scratch,
+            )  # fmt: skip
+            if sample != 1:
+                rows[used, 6] = max(rows[used, 6], ratio)
+            rows[used, 7 + sample] = factor
+            rows[used, 7 + SAMPLES + sample] = width
+            rows[used, 7 + 2 * SAMPLES + sample] = bend
+        used += 1
+    return used
+
+
+@kernel
 def cast_shadows(
     polygons: Polygons,
     outlines: Outlines,
@@ -174,90 +261,3 @@ def cast_shadows(
                         return before, pair, first
         first += count
     return used, len(receivers), first
-
-
-@kernel
-def _write_parts(
-    polygons: Polygons,
-    outlines: Outlines,
-    r: int,
-    s: int,
-    blocker: int,
-    is_ev: bool,
-    cast_by: int,
-    wedge: FloatArray,
-    planes: FloatArray,
-    sides: int,
-    size: float,
-    rays: FloatArray,
-    ray_count: int,
-    cuts: FloatArray,
-    cut_count: int,
-    reach: float,
-    pool: IntArray,
-    first: int,
-    count: int,
-    tolerance: float,
-    keep_hidden: bool,
-    hidden: FloatArray,
-    parts: FloatArray,
-    rows: FloatArray,
-    ids: IntArray,
-    used: int,
-) -> int:
-    """Write the free parts of a wedge (3, 3) of apex and base, with their strengths, as rows from `used` on.
-
-    Returns how many rows are used then, or -1 if they are full.
-    """
-    segment = np.empty((2, 3))
-    o = polygons.corners[r, 0]
-    for end in range(2):
-        meet_receiver(wedge, float(end), planes, o, is_ev, segment[end])
-    if not counts_as_segment(planes, sides, segment, size):
-        return used
-    normal = np.empty(3)
-    if not wedge_normal(wedge, normal):
-        return used
-    free = 1
-    parts[0, 0] = 0.0
-    parts[0, 1] = 1.0
-    if not keep_hidden:
-        free = free_parts(
-            polygons, outlines, wedge, normal, is_ev, cast_by, r, s, pool, first, count, tolerance, hidden,
-            parts,
-        )  # fmt: skip
-    scratch = np.empty((8, 3))
-    x, b, source_point = np.empty((3, 3))
-    for part in range(free):
-        u0 = parts[part, 0]
-        u1 = parts[part, 1]
-        w0 = meet_receiver(wedge, u0, planes, o, is_ev, segment[0])
-        w1 = meet_receiver(wedge, u1, planes, o, is_ev, segment[1])
-        if not counts_as_segment(planes, sides, segment, size):
-            continue
-        if used == len(rows):
-            return -1
-        write_segment(polygons, r, s, blocker, EV if is_ev else VE, segment, used, rows, ids)
-        rows[used, 6] = 0.0
-        for sample in range(SAMPLES):
-            # The middle of the segment is not that of the base: the base is seen in perspective.
-            u = u0 if sample == 0 else u1
-            if sample == 1:
-                u = u0 + (u1 - u0) * w0 / (w0 + w1)
-            meet_receiver(wedge, u, planes, o, is_ev, x)
-            for axis in range(3):
-                x[axis] += o[axis]
-                base = wedge[1, axis] + u * (wedge[2, axis] - wedge[1, axis])
-                b[axis] = wedge[0, axis] if is_ev else base
-                source_point[axis] = base if is_ev else wedge[0, axis]
-            ratio, factor, width, bend = wedge_strength(
-                polygons, r, s, x, b, source_point, normal, rays, ray_count, cuts, cut_count, reach,
-                tolerance, scratch,
-            )  # fmt: skip
-            if sample != 1:
-                rows[used, 6] = max(rows[used, 6], ratio)
-            rows[used, 7 + sample] = factor
-            rows[used, 7 + SAMPLES + sample] = width
-            rows[used, 7 + 2 * SAMPLES + sample] = bend
-        used += 1
-    return used

@@ -21,54 +21,6 @@ _AT_APEX: Final = 1e-9
 
 
 @kernel
-def free_parts(
-    polygons: Polygons,
-    outlines: Outlines,
-    wedge: FloatArray,
-    normal: FloatArray,
-    is_ev: bool,
-    skip: int,
-    receiver: int,
-    source: int,
-    pool: IntArray,
-    first: int,
-    count: int,
-    tolerance: float,
-    hidden: FloatArray,
-    parts: FloatArray,
-) -> int:
-    """The parts of a wedge's base that the blockers pool[first : first + count] leave free.
-
-    wedge (3, 3): apex and the base's ends, world metres; normal (3,) unit; skip: the edge (VE) or vertex
-    (EV) that casts the shadow, whose own sheets hide nothing; hidden (>= 2 count, 2) is scratch. Intervals
-    within [0, 1] are written to parts (>= 2 count + 1, 2), ascending; returns their number.
-    """
-    intervals = 0
-    for entry in range(first, first + count):
-        c = pool[entry]
-        n = polygons.counts[c]
-        # Only polygons on both sides of the wedge's plane cut it.
-        low = 0.0
-        high = 0.0
-        for k in range(n):
-            h = _over(polygons, c, k, wedge, normal)
-            low = min(low, h)
-            high = max(high, h)
-        if low >= -tolerance or high <= tolerance:
-            continue
-        own = False
-        for k in range(n):
-            if (is_ev and outlines.vertex[c, k] == skip) or (not is_ev and outlines.edge[c, k] == skip):
-                own = True
-        if own:
-            continue
-        if is_ev and _holds(polygons, c, wedge[0], tolerance):
-            return 0
-        intervals = _hide(polygons, c, wedge, normal, is_ev, receiver, source, tolerance, hidden, intervals)
-    return _complement(hidden, intervals, parts)
-
-
-@kernel
 def _over(polygons: Polygons, c: int, k: int, wedge: FloatArray, normal: FloatArray) -> float:
     """Height of corner k of a patch over the wedge's plane."""
     return float(
@@ -226,3 +178,63 @@ def _complement(hidden: FloatArray, intervals: int, parts: FloatArray) -> int:
         parts[free, 1] = 1.0
         free += 1
     return free
+
+
+@kernel
+def free_parts(
+    polygons: Polygons,
+    outlines: Outlines,
+    wedge: FloatArray,
+    normal: FloatArray,
+    is_ev: bool,
+    skip: int,
+    receiver: int,
+    source: int,
+    pool: IntArray,
+    first: int,
+    count: int,
+    tolerance: float,
+    hidden: FloatArray,
+    parts: FloatArray,
+) -> int:
+    """The parts of a wedge's base that the blockers pool[first : first + count] leave free.
+
+    wedge (3, 3): apex and the base's ends, world metres; normal (3,) unit; skip: the edge (VE) or vertex
+    (EV) that casts the shadow, whose own sheets hide nothing; hidden (>= 2 count, 2) is scratch. Intervals
+    within [0, 1] are written to parts (>= 2 count + 1, 2), ascending; returns their number.
+    """
+    intervals = 0
+    for entry in range(first, first + count):
+        c = pool[entry]
+        n = polygons.counts[c]
+        # Only polygons on both sides of the wedge's plane cut it.
+        middle = polygons.middles[c]
+        apart = (
+            normal[0] * (middle[0] - wedge[0, 0])
+            + normal[1] * (middle[1] - wedge[0, 1])
+            + normal[2] * (middle[2] - wedge[0, 2])
+        )
+        if abs(apart) >= polygons.radii[c]:
+            continue
+        low = 0.0
+        high = 0.0
+        for k in range(n):
+            h = _over(polygons, c, k, wedge, normal)
+            low = min(low, h)
+            high = max(high, h)
+        if low >= -tolerance or high <= tolerance:
+            continue
+        own = False
+        for k in range(n):
+            if (is_ev and outlines.vertex[c, k] == skip) or (not is_ev and outlines.edge[c, k] == skip):
+                own = True
+        if own:
+            continue
+        if is_ev and _holds(polygons, c, wedge[0], tolerance):
+            return 0
+        before = intervals
+        intervals = _hide(polygons, c, wedge, normal, is_ev, receiver, source, tolerance, hidden, intervals)
+        for i in range(before, intervals):
+            if hidden[i, 0] <= 0.0 and hidden[i, 1] >= 1.0:
+                return 0
+    return _complement(hidden, intervals, parts)

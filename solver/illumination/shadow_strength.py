@@ -24,6 +24,27 @@ from solver.types import FloatArray
 
 
 @kernel
+def _longest_chord(
+    polygons: Polygons, source: int, lx: float, ly: float, lz: float, qx: float, qy: float, qz: float
+) -> float:
+    """Bound of the longest chord of a patch along l: a convex polygon fills half of chord times breadth."""
+    low_l = math.inf
+    high_l = -math.inf
+    low_q = math.inf
+    high_q = -math.inf
+    for k in range(polygons.counts[source]):
+        c = polygons.corners[source, k]
+        o = polygons.corners[source, 0]
+        along = lx * (c[0] - o[0]) + ly * (c[1] - o[1]) + lz * (c[2] - o[2])
+        across = qx * (c[0] - o[0]) + qy * (c[1] - o[1]) + qz * (c[2] - o[2])
+        low_l = min(low_l, along)
+        high_l = max(high_l, along)
+        low_q = min(low_q, across)
+        high_q = max(high_q, across)
+    return float(min(high_l - low_l, 2.0 * polygons.areas[source] / (high_q - low_q)))
+
+
+@kernel
 def wedge_strength(
     polygons: Polygons,
     receiver: int,
@@ -112,24 +133,3 @@ def wedge_strength(
     if density > 0.0:
         bend = corner * density * scale * scale
     return d_sb / d_br, factor, width, bend
-
-
-@kernel
-def _longest_chord(
-    polygons: Polygons, source: int, lx: float, ly: float, lz: float, qx: float, qy: float, qz: float
-) -> float:
-    """Bound of the longest chord of a patch along l: a convex polygon fills half of chord times breadth."""
-    low_l = math.inf
-    high_l = -math.inf
-    low_q = math.inf
-    high_q = -math.inf
-    for k in range(polygons.counts[source]):
-        c = polygons.corners[source, k]
-        o = polygons.corners[source, 0]
-        along = lx * (c[0] - o[0]) + ly * (c[1] - o[1]) + lz * (c[2] - o[2])
-        across = qx * (c[0] - o[0]) + qy * (c[1] - o[1]) + qz * (c[2] - o[2])
-        low_l = min(low_l, along)
-        high_l = max(high_l, along)
-        low_q = min(low_q, across)
-        high_q = max(high_q, across)
-    return float(min(high_l - low_l, 2.0 * polygons.areas[source] / (high_q - low_q)))

@@ -9,7 +9,7 @@ import pytest
 
 from solver.document.samples import load_sample
 from solver.engine.world import World
-from solver.geometry.scene import Mesh, SceneObject
+from solver.geometry.scene import Material, Mesh, SceneObject
 from solver.illumination.discontinuities import (
     BEND,
     KINK,
@@ -74,6 +74,25 @@ def test_a_square_under_a_square_lamp() -> None:
     np.testing.assert_array_equal(found.source, 1)
     np.testing.assert_array_equal(found.blocker, 2)
     assert not found.jump.any()
+
+
+def test_vertices_on_straight_outlines_cast_nothing() -> None:
+    """A screen or a lamp of 2 x 2 squares has cut edges, but no more corners than a whole one."""
+    whole, lamp = polygon("screen", square(0.2, 0.5)), grid("lamp", 0.5, HEIGHT, LIGHT)
+    in_pieces = find(surfaces_of(FLOOR, LAMP, grid("screen", 0.2, 0.5, GREY)), [0]).counts()
+    assert (in_pieces["VE"], in_pieces["EV"]) == (4 * 8, 4 * 4)
+    surfaces = surfaces_of(FLOOR, lamp, whole)
+    assert np.all(surfaces.normal[1:5, 2] == -1.0)
+    of_pieces = find(surfaces, [0]).counts()
+    assert (of_pieces["VE"], of_pieces["EV"]) == (4 * 4, 8 * 4)
+
+
+def grid(name: str, half: float, z: float, material: Material) -> SceneObject:
+    """2 x 2 squares that share vertices; a lamp's face down."""
+    vertices = np.array([[x, y, z] for y in (-half, 0.0, half) for x in (-half, 0.0, half)])
+    faces = [(a, a + 1, a + 4, a + 3) for a in (0, 1, 3, 4)]
+    turned = tuple(face[::-1] if material is LIGHT else face for face in faces)
+    return SceneObject(name, Mesh(vertices, turned), material)
 
 
 def test_a_turned_screen_bends_the_second_derivative_only() -> None:
@@ -141,9 +160,7 @@ def test_silhouettes_of_a_box(eye: tuple[float, float, float], count: int, trian
 
 def test_outlines_of_a_flat_face_in_pieces() -> None:
     """Of a 2 x 2 grid of squares only the outer edges bound anything, and only its four corners turn."""
-    grid = np.array([[x, y, 0.0] for y in range(3) for x in range(3)])
-    cells = tuple((a, a + 1, a + 4, a + 3) for a in (0, 1, 3, 4))
-    outlines = find_outlines(surfaces_of(SceneObject("grid", Mesh(grid, cells), GREY)))
+    outlines = find_outlines(surfaces_of(grid("grid", 1.0, 0.0, GREY)))
     assert len(outlines.ends) == 12 and outlines.is_flat.sum() == 4
     assert sum(is_silhouette(outlines, e, 0.3, 0.4, 3.0, 1e-9) for e in range(12)) == 8
     assert outlines.is_corner.sum() == 4
@@ -262,11 +279,11 @@ def test_no_horizon_where_nothing_is_exchanged() -> None:
     assert not np.any(find(surfaces_of(FLOOR, sunk), [0]).kind == HORIZON)
 
 
-def test_a_sheet_seen_edge_on() -> None:
+@pytest.mark.parametrize(("top", "far"), [(1.0, 0.2 + 0.7), (1.6, 2.0)], ids=["within", "to-the-border"])
+def test_a_sheet_seen_edge_on(top: float, far: float) -> None:
     """A standing sheet's plane x = 0.1 under a lamp: shaded as far as lines over its top lead."""
-    sheet = np.array([[0.1, -0.2, 0.5], [0.1, 0.2, 0.5], [0.1, 0.2, 1.0], [0.1, -0.2, 1.0]])
+    sheet = np.array([[0.1, -0.2, 0.5], [0.1, 0.2, 0.5], [0.1, 0.2, top], [0.1, -0.2, top]])
     found = of_kind(find(surfaces_of(FLOOR, LAMP, polygon("sheet", sheet)), [0]), GRAZE)
-    far = 0.2 + (0.2 + 0.5) * 1.0 / 1.0
     assert unordered(found.ends) == unordered(np.array([[[0.1, -far, 0], [0.1, far, 0]]]))
 
 

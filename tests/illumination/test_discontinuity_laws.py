@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 from solver.geometry.scene import Mesh, SceneObject
 from solver.geometry.transform import Transform
-from solver.illumination.discontinuities import Discontinuities
+from solver.illumination.discontinuities import Discontinuities, find_discontinuities
 from solver.illumination.outlines import find_outlines
-from solver.illumination.segments import EV, GRAZE, VE, Polygons, receiver_planes
+from solver.illumination.segments import EV, GRAZE, SHORTEST, VE, polygons_of, receiver_planes
 from solver.illumination.sets import ActiveEdges, group_discontinuities
 from solver.illumination.shadow_sight import free_parts
 from solver.illumination.wedges import meet_receiver, wedge_normal
@@ -29,12 +29,14 @@ from tests.illumination.shadow_scenes import (
     Shadows,
     box,
     find,
+    hierarchy_of,
     polygon,
     shadows,
     solid,
     square,
     surfaces_of,
 )
+from tests.visibility.soups import Soup, soups
 
 STEPS = 700
 
@@ -94,6 +96,43 @@ def test_derivatives_jump_by_what_is_told(scene: Shadows) -> None:
             np.testing.assert_allclose(abs(jump[1]), expected, rtol=0.15, atol=1e-6)
 
 
+@settings(max_examples=6)
+@given(shadows())
+def test_weights_bound_what_interpolation_misses(scene: Shadows) -> None:
+    """Of a quadratic across a cell with the line anywhere in it, on top of what it misses in cells without;
+    and not by much, where the line is sharp."""
+    found = find(scene.surfaces, [0])
+    middle = found.ends.mean(axis=1)
+    near = np.array([min(0.4 * distance_to_others(found, k, middle[k]), 0.05) for k in range(len(found))])
+    # The weight of what is as strong all along as in its middle, per W/m2 of the source.
+    even = replace(
+        found,
+        form_factor=np.repeat(found.form_factor[:, 1:2], 3, axis=1),
+        width=np.repeat(found.width[:, 1:2], 3, axis=1),
+        bend=np.repeat(found.bend[:, 1:2], 3, axis=1),
+    )
+    weight = even.weights(np.ones(scene.surfaces.patch_count), near)
+    for k in np.argsort(-weight)[:5]:
+        along = found.ends[k, 1] - found.ends[k, 0]
+        across = np.array([-along[1], along[0], 0.0]) / np.linalg.norm(along)
+        missed = {
+            shift: missed_by_parabola(scene, middle[k] + shift * near[k] * across, near[k] * across)
+            for shift in (-1.0, -0.79, -0.6, -0.5, -0.4, 0.0)
+        }
+        smooth = 2.0 * max(missed.pop(-1.0), missed.pop(0.0))
+        assert max(missed.values()) <= 1.15 * weight[k] + smooth
+        if found.kind[k] != GRAZE and smooth < 0.05 * weight[k]:
+            assert max(missed.values()) >= 0.25 * weight[k]
+
+
+def missed_by_parabola(scene: Shadows, start: FloatArray, step: FloatArray) -> float:
+    """Greatest error of the parabola through ends and middle of a cell from start to start + step."""
+    x = np.linspace(0.0, 1.0, 21)
+    values = scene.along(start, step, x)
+    parabola = values[0] * (1 - x) * (1 - 2 * x) + values[10] * 4 * x * (1 - x) + values[20] * x * (2 * x - 1)
+    return float(np.abs(parabola - values).max())
+
+
 def distance_to_others(found: Discontinuities, k: int, point: FloatArray) -> float:
     """Distance of a point from all discontinuities but the k-th, m."""
     a, along = found.ends[:, 0], found.ends[:, 1] - found.ends[:, 0]
@@ -115,7 +154,7 @@ def test_free_parts_of_a_wedge_are_those_that_nothing_crosses(seed: int, is_ev: 
     ]
     loose = [polygon(f"sheet{k}", corners) for k, corners in enumerate(sheets)]
     surfaces = surfaces_of(FLOOR, LAMP, *loose)
-    polygons = Polygons(surfaces.corners, surfaces.corner_count, surfaces.normal, surfaces.area)
+    polygons = polygons_of(surfaces)
     wedge = random.uniform([-0.6, -0.6, 0.8], [0.6, 0.6, 1.2], (3, 3))
     wedge[(1, 2) if is_ev else 0, 2] = HEIGHT
     normal, planes, parts = np.empty(3), np.empty((5, 4)), np.empty((20, 2))
@@ -218,3 +257,26 @@ def covers(edges: ActiveEdges, others: ActiveEdges) -> bool:
     """Whether each of `others` lies on `edges`, to 1e-6 m."""
     lines = shapely.MultiLineString([segment[:, :2].tolist() for segment in edges.ends]).buffer(2e-6)
     return all(lines.covers(shapely.LineString(segment[:, :2])) for segment in others.ends)
+
+
+@settings(max_examples=25)
+@given(soups(most=8, anywhere=True))
+def test_any_soup_of_polygons(soup: Soup) -> None:
+    """Every patch is lit by every other: all is finite, in the receiver's plane, and long enough."""
+    surfaces = soup.surfaces
+    everyone = np.arange(surfaces.patch_count, dtype=np.int32)
+    found = find_discontinuities(surfaces, hierarchy_of(surfaces), everyone)
+    assert np.all(np.isfinite(found.ends)) and not np.isnan(found.ratio).any()
+    for array in (found.form_factor, found.width, found.bend):
+        assert np.all(array >= 0.0)
+    assert np.all(found.form_factor <= 1.0 + 1e-9)
+    local = found.ends - surfaces.corners[found.receiver, 0][:, None]
+    height = np.einsum("dek,dk->de", local, surfaces.normal[found.receiver])
+    assert np.abs(height).max(initial=0.0) <= 1e-8 * surfaces.size
+    apart = surfaces.corners[:, :, None] - surfaces.corners[:, None]
+    size = np.linalg.norm(apart, axis=-1).max(axis=(1, 2))[found.receiver]
+    assert np.all(np.linalg.norm(found.ends[:, 1] - found.ends[:, 0], axis=1) > 0.999 * SHORTEST * size)
+    weight = found.weights(np.ones(surfaces.patch_count), 0.1 * size)
+    assert not np.isnan(weight).any() and np.all(weight[~found.jump] <= 1.0 + 1e-9)
+    sets = group_discontinuities(surfaces, found)
+    np.testing.assert_array_equal(sets.patch[sets.member], found.receiver)
