@@ -24,7 +24,7 @@ from solver.illumination.segments import (
     receiver_planes,
     write_segment,
 )
-from solver.illumination.shadow_sight import free_parts
+from solver.illumination.shadow_sight import free_parts, gather_spheres
 from solver.illumination.shadow_strength import wedge_strength
 from solver.illumination.silhouettes import is_silhouette, silhouette_rays, silhouette_spans
 from solver.illumination.wedges import (
@@ -63,8 +63,10 @@ def _write_parts(
     pool: IntArray,
     first: int,
     count: int,
+    spheres: FloatArray,
     tolerance: float,
     keep_hidden: bool,
+    apart: FloatArray,
     hidden: FloatArray,
     parts: FloatArray,
     rows: FloatArray,
@@ -89,8 +91,8 @@ def _write_parts(
     parts[0, 1] = 1.0
     if not keep_hidden:
         free = free_parts(
-            polygons, outlines, wedge, normal, is_ev, cast_by, r, s, pool, first, count, tolerance, hidden,
-            parts,
+            polygons, outlines, wedge, normal, is_ev, cast_by, r, s, pool, first, count, spheres, tolerance,
+            apart, hidden, parts,
         )  # fmt: skip
     scratch = np.empty((8, 3))
     x, b, source_point = np.empty((3, 3))
@@ -159,6 +161,7 @@ def cast_shadows(
     known = np.empty((4 * most, HEIGHTS))
     planes = np.empty((5, 4))
     hidden, parts = np.empty((2 * most, 2)), np.empty((2 * most + 1, 2))
+    spheres, apart = np.empty((4, most)), np.empty(most)
     wedge = np.empty((3, 3))
     rays, cuts = np.empty((2, max(2, outlines.widest_fan), 3))
     spans = np.empty(outlines.widest_fan + 2)
@@ -176,6 +179,7 @@ def cast_shadows(
         size = patch_diameter(polygons, r)
         vertices = 0
         edges = 0
+        gather_spheres(polygons, pool, first, count, spheres)
         for entry in range(first, first + count):
             c = pool[entry]
             for k in range(polygons.counts[c]):
@@ -219,8 +223,8 @@ def cast_shadows(
                         wedge[2, axis] = outlines.point[a, axis] + t1 * cuts[0, axis]
                     used = _write_parts(
                         polygons, outlines, r, s, by[i], False, e, wedge, planes, sides, size, rays, 2, cuts,
-                        1, math.inf, pool, first, count, tolerance, keep_hidden, hidden, parts, rows, ids,
-                        used,
+                        1, math.inf, pool, first, count, spheres, tolerance, keep_hidden, apart, hidden,
+                        parts, rows, ids, used,
                     )  # fmt: skip
                     if used < 0:
                         return before, pair, first
@@ -255,7 +259,8 @@ def cast_shadows(
                         continue
                     used = _write_parts(
                         polygons, outlines, r, s, met[i], True, w, wedge, planes, sides, size, rays, m, rays,
-                        m, length, pool, first, count, tolerance, keep_hidden, hidden, parts, rows, ids, used,
+                        m, length, pool, first, count, spheres, tolerance, keep_hidden, apart, hidden,
+                        parts, rows, ids, used,
                     )  # fmt: skip
                     if used < 0:
                         return before, pair, first

@@ -181,6 +181,28 @@ def _complement(hidden: FloatArray, intervals: int, parts: FloatArray) -> int:
 
 
 @kernel
+def gather_spheres(polygons: Polygons, pool: IntArray, first: int, count: int, spheres: FloatArray) -> None:
+    """Middles and radii around the blockers pool[first : first + count], side by side: (4, >= count)."""
+    for k in range(count):
+        for axis in range(3):
+            spheres[axis, k] = polygons.middles[pool[first + k], axis]
+        spheres[3, k] = polygons.radii[pool[first + k]]
+
+
+@kernel
+def _near_plane(
+    spheres: FloatArray, count: int, x: FloatArray, normal: FloatArray, apart: FloatArray
+) -> None:
+    """How far each sphere reaches through the plane at x (3,) with that normal, m, into apart (>= count)."""
+    a = normal[0]
+    b = normal[1]
+    c = normal[2]
+    d = a * x[0] + b * x[1] + c * x[2]
+    for k in range(count):
+        apart[k] = spheres[3, k] - abs(a * spheres[0, k] + b * spheres[1, k] + c * spheres[2, k] - d)
+
+
+@kernel
 def free_parts(
     polygons: Polygons,
     outlines: Outlines,
@@ -193,29 +215,27 @@ def free_parts(
     pool: IntArray,
     first: int,
     count: int,
+    spheres: FloatArray,
     tolerance: float,
+    apart: FloatArray,
     hidden: FloatArray,
     parts: FloatArray,
 ) -> int:
     """The parts of a wedge's base that the blockers pool[first : first + count] leave free.
 
     wedge (3, 3): apex and the base's ends, world metres; normal (3,) unit; skip: the edge (VE) or vertex
-    (EV) that casts the shadow, whose own sheets hide nothing; hidden (>= 2 count, 2) is scratch. Intervals
-    within [0, 1] are written to parts (>= 2 count + 1, 2), ascending; returns their number.
+    (EV) that casts the shadow, whose own sheets hide nothing; spheres: as `gather_spheres` lays them out;
+    apart (>= count) and hidden (>= 2 count, 2) are scratch. Intervals within [0, 1] are written to parts
+    (>= 2 count + 1, 2), ascending; returns their number.
     """
     intervals = 0
-    for entry in range(first, first + count):
-        c = pool[entry]
-        n = polygons.counts[c]
+    _near_plane(spheres, count, wedge[0], normal, apart)
+    for entry in range(count):
         # Only polygons on both sides of the wedge's plane cut it.
-        middle = polygons.middles[c]
-        apart = (
-            normal[0] * (middle[0] - wedge[0, 0])
-            + normal[1] * (middle[1] - wedge[0, 1])
-            + normal[2] * (middle[2] - wedge[0, 2])
-        )
-        if abs(apart) >= polygons.radii[c]:
+        if apart[entry] <= 0.0:
             continue
+        c = pool[first + entry]
+        n = polygons.counts[c]
         low = 0.0
         high = 0.0
         for k in range(n):

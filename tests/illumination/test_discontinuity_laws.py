@@ -17,7 +17,7 @@ from solver.illumination.discontinuities import Discontinuities, find_discontinu
 from solver.illumination.outlines import find_outlines
 from solver.illumination.segments import EV, GRAZE, SHORTEST, VE, polygons_of, receiver_planes
 from solver.illumination.sets import ActiveEdges, group_discontinuities
-from solver.illumination.shadow_sight import free_parts
+from solver.illumination.shadow_sight import free_parts, gather_spheres
 from solver.illumination.wedges import meet_receiver, wedge_normal
 from solver.types import FloatArray
 from solver.visibility.brute_force import blocking_margin
@@ -142,7 +142,7 @@ def distance_to_others(found: Discontinuities, k: int, point: FloatArray) -> flo
     return float(distance.min())
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_free_parts_of_a_wedge_are_those_that_nothing_crosses(seed: int, is_ev: bool) -> None:
     """Sight lines from a source's vertex past an edge, or from an edge of it past a vertex, one by one."""
@@ -161,9 +161,11 @@ def test_free_parts_of_a_wedge_are_those_that_nothing_crosses(seed: int, is_ev: 
     assert wedge_normal(wedge, normal)
     receiver_planes(polygons, 0, planes)
     pool = np.arange(2, surfaces.patch_count, dtype=np.int32)
+    spheres = np.empty((4, len(pool)))
+    gather_spheres(polygons, pool, 0, len(pool), spheres)
     count = free_parts(
-        polygons, find_outlines(surfaces), wedge, normal, is_ev, -1, 0, 1, pool, 0, len(pool),
-        1e-9, np.empty((20, 2)), parts,
+        polygons, find_outlines(surfaces), wedge, normal, is_ev, -1, 0, 1, pool, 0, len(pool), spheres,
+        1e-9, np.empty(20), np.empty((20, 2)), parts,
     )  # fmt: skip
     places = np.linspace(0.01, 0.99, 200)
     met, origin = np.empty((200, 3)), surfaces.corners[0, 0]
@@ -233,7 +235,7 @@ def furnished() -> list[SceneObject]:
     ]
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(shadows(sheets=False))
 def test_cutting_faces_in_pieces_changes_no_line(scene: Shadows) -> None:
     """A blocker and a lamp made of triangles make the same edges as those made of quadrilaterals."""
