@@ -1,14 +1,18 @@
-"""What HTTP's headers of a frame request say: the formats that a client accepts, the frames that it has."""
+"""What HTTP's headers of a request say: the formats that a client accepts, the frames that it has."""
 
 from __future__ import annotations
 
 import re
-from typing import Final, TypeAlias
+from collections.abc import Mapping
+from typing import Final, TypeAlias, TypeVar
 
 from service.problems import NOT_ACCEPTABLE, ProblemError
+from solver.engine.overlays.files import OverlayFormat
 from solver.rendering.encoding import LinearFormat, PictureFormat
 
 FrameFormat: TypeAlias = PictureFormat | LinearFormat
+
+T = TypeVar("T")
 
 MEDIA_TYPES: Final[dict[FrameFormat, str]] = {
     PictureFormat.PNG: "image/png",
@@ -20,17 +24,33 @@ MEDIA_TYPES: Final[dict[FrameFormat, str]] = {
 }
 """In the order of preference where a client accepts several alike."""
 
+OVERLAY_TYPES: Final[dict[OverlayFormat, str]] = {
+    OverlayFormat.JSON: "application/json",
+    OverlayFormat.GLB: "model/gltf-binary",
+}
+"""The same for overlays"""
+
 _QUALITY: Final = re.compile(r"q=(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
 _TAG: Final = re.compile(r'(?:W/)?"([^"]*)"')
 
 
 def choose_format(accept: str) -> FrameFormat:
-    """The format that an Accept header (RFC 9110, 12.5.1) likes best. Raises ProblemError if none is."""
+    """The format of frames that an Accept header likes best. Raises ProblemError if it likes none."""
+    return _choose(accept, MEDIA_TYPES, "a frame")
+
+
+def choose_overlay_format(accept: str) -> OverlayFormat:
+    """The format of overlays that an Accept header likes best. Raises ProblemError if it likes none."""
+    return _choose(accept, OVERLAY_TYPES, "an overlay")
+
+
+def _choose(accept: str, types: Mapping[T, str], what: str) -> T:
+    """By RFC 9110, 12.5.1; `types` in the order of preference."""
     ranges = _ranges(accept or "*/*")
-    qualities = {chosen: _quality(media, ranges) for chosen, media in MEDIA_TYPES.items()}
+    qualities = {chosen: _quality(media, ranges) for chosen, media in types.items()}
     best = max(qualities, key=lambda chosen: qualities[chosen])
     if qualities[best] == 0.0:
-        raise ProblemError(NOT_ACCEPTABLE, f"a frame can be had as {', '.join(MEDIA_TYPES.values())}")
+        raise ProblemError(NOT_ACCEPTABLE, f"{what} can be had as {', '.join(types.values())}")
     return best
 
 

@@ -53,6 +53,7 @@ class Kind:
 INVALID: Final = Kind("invalid", 422, "The input is not acceptable")
 NO_SUCH_SESSION: Final = Kind("no-such-session", 404, "There is no such session")
 CONFLICT: Final = Kind("revision-conflict", 409, "The scene is at another revision")
+NOT_READY: Final = Kind("not-ready", 409, "What was asked for is not there yet")
 LIMIT: Final = Kind("limit-exceeded", 413, "More than the limit was asked for")
 TOO_MANY_SESSIONS: Final = Kind("too-many-sessions", 429, "There are too many sessions")
 UNAUTHORIZED: Final = Kind("unauthorized", 401, "A bearer token is needed")
@@ -69,6 +70,7 @@ _OF_REFUSAL: Final = {
     RefusalKind.LIMIT: LIMIT,
     RefusalKind.NOT_AVAILABLE: NOT_AVAILABLE,
     RefusalKind.NO_RENDERING: NO_RENDERING,
+    RefusalKind.NOT_READY: NOT_READY,
 }
 
 _PLAIN_MESSAGE: Final = {"extra_forbidden": "unknown field", "missing": "field required"}
@@ -84,7 +86,7 @@ _TITLES: Final = {
     401: UNAUTHORIZED.title,
     404: NO_SUCH_SESSION.title,
     406: NOT_ACCEPTABLE.title,
-    409: CONFLICT.title,
+    409: "The scene is at another revision, or what was asked for is not there yet",
     413: LIMIT.title,
     415: UNSUPPORTED_MEDIA.title,
     422: INVALID.title,

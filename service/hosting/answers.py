@@ -14,6 +14,7 @@ from service.hosting.messages import (
     EditsAnswer,
     FrameAnswer,
     GetFrame,
+    GetPick,
     GetScene,
     GetStatus,
     Probe,
@@ -23,6 +24,7 @@ from service.hosting.messages import (
 )
 from solver.engine.drawing import encode
 from solver.engine.engine import Engine
+from solver.engine.overlays.base import NotReadyError
 from solver.engine.requests import NotAvailableError
 from solver.engine.views import Outlook
 from solver.errors import (
@@ -51,6 +53,8 @@ def answer(engine: Engine, request: AnyRequest) -> object:
         case ApplyEdits(edits, if_revision):
             changes = engine.apply(edits, if_revision)
             return EditsAnswer(engine.revision, changes)
+        case GetPick(camera, x, y):
+            return engine.pick(camera, x, y)
         case Probe(positions, normals):
             return engine.probe(positions, normals)
         case _:
@@ -88,6 +92,8 @@ def refusal_of(error: SolverError | MemoryError) -> Refusal:
             return Refusal(RefusalKind.LIMIT, str(error))
         case NotAvailableError():
             return Refusal(RefusalKind.NOT_AVAILABLE, str(error), (error.what,))
+        case NotReadyError():
+            return Refusal(RefusalKind.NOT_READY, str(error))
         case RenderingUnavailableError():
             return Refusal(RefusalKind.NO_RENDERING, str(error))
         case MemoryError():

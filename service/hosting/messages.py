@@ -14,7 +14,10 @@ from solver.document.edits import Edit
 from solver.document.fields import Location
 from solver.document.limits import SceneLimits
 from solver.document.settings import SettingsDocument
-from solver.engine.requests import Encoding, FrameLimits, FrameRequest, Wait
+from solver.engine.overlays.base import OverlayRequest
+from solver.engine.overlays.files import OverlayFormat
+from solver.engine.picking import PickResult
+from solver.engine.requests import CameraChoice, Encoding, FrameLimits, FrameRequest, Wait
 from solver.engine.status import Change, EngineStatus, ProbeResult
 from solver.engine.views import Outlook
 from solver.geometry.scene import Scene
@@ -114,6 +117,32 @@ class Probe(Request[ProbeResult]):
     normals: FloatArray
 
 
+@dataclass(frozen=True)
+class GetPick(Request[PickResult]):
+    """What a pixel shows."""
+
+    camera: CameraChoice
+    x: int
+    y: int
+
+
+@dataclass(frozen=True)
+class OverlayAnswer:
+    """An encoded overlay."""
+
+    content: bytes
+
+
+@dataclass(frozen=True)
+class GetOverlay(Request[OverlayAnswer]):
+    """An overlay, once it can be shown; refused where time is up before."""
+
+    overlay: OverlayRequest
+    format: OverlayFormat
+    timeout: float
+    """Seconds"""
+
+
 class RefusalKind(StrEnum):
     """Why a request was refused."""
 
@@ -122,6 +151,7 @@ class RefusalKind(StrEnum):
     LIMIT = "limit"
     NOT_AVAILABLE = "not_available"
     NO_RENDERING = "no_rendering"
+    NOT_READY = "not_ready"
 
 
 @dataclass(frozen=True)

@@ -14,23 +14,22 @@ import socket
 import sys
 import threading
 import time
-from dataclasses import dataclass
 from typing import Final
 
-from service.hosting.answers import REFUSED, answer, answer_frame, refusal_of
+from service.hosting.answers import REFUSED, answer, refusal_of
 from service.hosting.messages import (
     Abandon,
     Answer,
     AnyRequest,
     Call,
-    FrameAnswer,
     GetFrame,
+    GetOverlay,
     Open,
     Ready,
-    Refusal,
     StatusChanged,
     ToWorker,
 )
+from service.hosting.waiting import Waiting, WaitingFrame, WaitingOverlay
 from service.hosting.wire import WorkerEnd
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
@@ -44,14 +43,6 @@ REPORT_INTERVAL: Final = 0.1
 """Seconds between two reports while only the numbers of the status change."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Waiting:
-    """A frame that is not good enough yet."""
-
-    request: GetFrame
-    deadline: float
-
-
 class Host:
     """Serves the requests to one engine, and works on it in between."""
 
@@ -60,7 +51,7 @@ class Host:
         self._inbox = inbox
         self._drawing = drawing
         self._engine: Engine | None = None
-        self._waiting: dict[int, _Waiting] = {}
+        self._waiting: dict[int, Waiting] = {}
         self._busy = False
         self._reported: EngineStatus | None = None
         self._report_due = 0.0
@@ -73,22 +64,27 @@ class Host:
             if self._engine is not None:
                 self._serve_waiting(self._engine)
                 self._work(self._engine)
-                if not self._busy:
+                if not self._is_busy:
                     self._serve_waiting(self._engine)  # nothing will get better while this sleeps
 
     def _arrived(self) -> list[ToWorker]:
         """What has come; where there is nothing else to do, this waits for it."""
         messages = []
         try:
-            if not self._busy:
+            if not self._is_busy:
                 messages.append(self._inbox.get(timeout=self._spare_time()))
             while True:
                 messages.append(self._inbox.get_nowait())
         except queue.Empty:
             return messages
 
+    @property
+    def _is_busy(self) -> bool:
+        """Whether there is work to do without any message."""
+        return self._busy or any(waiting.is_working for waiting in self._waiting.values())
+
     def _spare_time(self) -> float | None:
-        """Seconds until a waiting frame must be sent; None where none waits."""
+        """Seconds until a waiting request must be answered; None where none waits."""
         if not self._waiting:
             return None
         return max(0.0, min(waiting.deadline for waiting in self._waiting.values()) - time.monotonic())
@@ -98,7 +94,9 @@ class Host:
             case Abandon(number):
                 self._waiting.pop(number, None)
             case Call(number, GetFrame() as request):
-                self._waiting[number] = _Waiting(request, time.monotonic() + request.timeout)
+                self._waiting[number] = WaitingFrame(request)
+            case Call(number, GetOverlay() as request):
+                self._waiting[number] = WaitingOverlay(request, SLICE)
             case Call(number, request):
                 value = self._answer(request)
                 self._report()
@@ -118,16 +116,14 @@ class Host:
             return refusal_of(error)
 
     def _serve_waiting(self, engine: Engine) -> None:
-        """Send the frames that are as good as asked, or whose time is up."""
+        """Answer what can be answered, or whose time is up."""
         for number, waiting in tuple(self._waiting.items()):
-            request = waiting.request
             try:
-                worth = engine.outlook(request.frame).is_worth(request.wait)
-                if not worth and time.monotonic() < waiting.deadline:
-                    continue
-                value: FrameAnswer | Refusal = answer_frame(engine, request)
+                value = waiting.poll(engine)
             except REFUSED as error:
                 value = refusal_of(error)
+            if value is None:
+                continue
             del self._waiting[number]
             self._end.send(Answer(number, value))
 

@@ -11,6 +11,11 @@ from service import openapi
 from service.app import create_app
 
 
+OVERLAYS = (
+    "mesh", "links", "blockers", "discontinuities", "triangulation", "samples", "graph", "probe",
+)  # fmt: skip
+
+
 def test_health(client: TestClient) -> None:
     answer = client.get("/healthz")
     assert answer.status_code == 200
@@ -61,6 +66,9 @@ def test_the_description_names_every_call_and_its_problems() -> None:
         ("get", "/v1/sessions/{id}/frame"),
         ("post", "/v1/sessions/{id}/probe"),
         ("get", "/v1/sessions/{id}/events"),
+        ("get", "/v1/sessions/{id}/pick"),
+        ("get", "/v1/sessions/{id}/overlays"),
+        *(("get", f"/v1/sessions/{{id}}/overlays/{name}") for name in OVERLAYS),
     }
     for methods in schema["paths"].values():
         for operation in methods.values():

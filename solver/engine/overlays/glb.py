@@ -11,8 +11,6 @@ import pygltflib as gltf
 from solver.engine.overlays.shapes import Primitives, Shapes
 from solver.types import AnyArray
 
-MEDIA_TYPE: Final = "model/gltf-binary"
-
 _UNLIT: Final = "KHR_materials_unlit"
 _BYTE: Final = 255.0
 

@@ -51,22 +51,25 @@ class LinksOverlay(Overlay):
         """One item a link. Raises SceneError naming `element`."""
         yield
         state, surfaces = subject.solution.solver.state, subject.world.surfaces
+        # Refinement puts new columns in the place of these; between two yields it may.
         tree, links = state.tree, state.links
+        version, all_p, all_q, all_kinds = subject.solution.version, links.p, links.q, links.kind
+        exchange, fraction = links.exchange, links.visibility
+        samples, blockers = links.samples, links.blocker_count
         chosen = np.ones(len(links), dtype=np.bool_)
         if self.element is not None:
             index_of(self.element, len(tree), "element", "elements")
-            chosen = (links.p == self.element) | (links.q == self.element)
-        kinds = np.bincount(links.kind[chosen], minlength=len(VISIBILITIES))
+            chosen = (all_p == self.element) | (all_q == self.element)
+        kinds = np.bincount(all_kinds[chosen], minlength=len(VISIBILITIES))
         for kind, name in VISIBILITIES.items():
             if self.kind == name:
-                chosen &= links.kind == kind
+                chosen &= all_kinds == kind
         ids = np.flatnonzero(chosen).astype(np.int32)
         if self.kind is LinkKind.PLANE:
-            ids = ids[(yield from _crossing(state, ids))]
+            ids = ids[(yield from _crossing(state, all_p[ids], all_q[ids]))]
         shown = self.page.of(ids)
-        crosses = yield from _crossing(state, shown)
-        p, q, kind_of = links.p[shown], links.q[shown], links.kind[shown]
-        exchange = links.exchange[shown]
+        p, q, kind_of = all_p[shown], all_q[shown], all_kinds[shown]
+        crosses = yield from _crossing(state, p, q)
         ends = np.stack([tree.centroid[p], tree.centroid[q]], axis=1)
         colour = np.where(crosses[:, None], PINK, _COLOURS[kind_of])
         names = np.array(list(VISIBILITIES.values()), dtype=object)
@@ -75,7 +78,7 @@ class LinksOverlay(Overlay):
             revision=subject.revision,
             total=len(ids),
             facts={
-                "solution": subject.solution.version,
+                "solution": version,
                 "objects": surfaces.object_ids,
                 "counts": {name: int(kinds[kind]) for kind, name in VISIBILITIES.items()},
             },
@@ -88,27 +91,28 @@ class LinksOverlay(Overlay):
                 "ends": ends,
                 "visibility": names[kind_of].tolist(),
                 "crosses_plane": crosses,
-                "form_factor_pq": exchange / tree.area[p],
-                "form_factor_qp": exchange / tree.area[q],
-                "exchange": exchange,
-                "visible_fraction": links.visibility[shown],
-                "samples": STRATA * links.samples[shown],
-                "blockers": links.blocker_count[shown],
+                "form_factor_pq": exchange[shown] / tree.area[p],
+                "form_factor_qp": exchange[shown] / tree.area[q],
+                "exchange": exchange[shown],
+                "visible_fraction": fraction[shown],
+                "samples": STRATA * samples[shown],
+                "blockers": blockers[shown],
                 "rgb": colour,
             },
             shapes=Shapes(lines=Primitives.of(ends, colour)),
         )
 
 
-def _crossing(state: TransportState, links: IntArray) -> Generator[None, None, BoolArray]:
-    """(n,) whether an end of each of `links` (n,) reaches through the plane of the other."""
-    tree, table = state.tree, state.links
+def _crossing(
+    state: TransportState, first: IntArray, second: IntArray
+) -> Generator[None, None, BoolArray]:
+    """(n,) whether one of two elements (n,) reaches through the plane of the other."""
+    tree = state.tree
     tolerance = tolerances.SIDE * state.surfaces.size
-    crosses = np.zeros(len(links), dtype=np.bool_)
-    for start in range(0, len(links), _AT_ONCE):
+    crosses = np.zeros(len(first), dtype=np.bool_)
+    for start in range(0, len(first), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
-        p, q = table.p[links[part]], table.q[links[part]]
-        for a, b in ((p, q), (q, p)):
+        for a, b in ((first[part], second[part]), (second[part], first[part])):
             offset = tree.corners[a] - tree.corners[b][:, :1]
             height = np.einsum("nka,na->nk", offset, tree.patch_normal[tree.patch[b]])
             crosses[part] |= (height.min(axis=1) < -tolerance) & (height.max(axis=1) > tolerance)

@@ -1,0 +1,87 @@
+"""Requests that a worker answers later: when the engine has got far enough, or time is up."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+from service.hosting.answers import answer_frame
+from service.hosting.messages import FrameAnswer, GetFrame, GetOverlay, OverlayAnswer
+from solver.engine.engine import Engine
+from solver.engine.overlays.base import Work, still_missing
+from solver.engine.overlays.files import encode_overlay
+
+
+class Waiting(Protocol):
+    """A request that waits."""
+
+    @property
+    def deadline(self) -> float:
+        """When it must be answered, by the monotonic clock."""
+
+    @property
+    def is_working(self) -> bool:
+        """Whether it has work of its own, and wants to be polled at once again."""
+
+    def poll(self, engine: Engine) -> object | None:
+        """The answer, after a slice of work; None while it waits. Raises REFUSED errors."""
+
+
+class WaitingFrame:
+    """A frame that is not good enough yet."""
+
+    is_working = False
+
+    def __init__(self, request: GetFrame) -> None:
+        self._request = request
+        self.deadline = time.monotonic() + request.timeout
+
+    def poll(self, engine: Engine) -> FrameAnswer | None:
+        """The frame, if it is as good as asked or its time is up; drawing one takes what it takes."""
+        worth = engine.outlook(self._request.frame).is_worth(self._request.wait)
+        if not worth and time.monotonic() < self.deadline:
+            return None
+        return answer_frame(engine, self._request)
+
+
+class WaitingOverlay:
+    """An overlay that cannot be shown yet, or is in the making."""
+
+    def __init__(self, request: GetOverlay, budget: float) -> None:
+        """`budget`: seconds of work of one poll."""
+        self._request = request
+        self._budget = budget
+        self._work: Work | None = None
+        self.deadline = time.monotonic() + request.timeout
+
+    @property
+    def is_working(self) -> bool:
+        """Once it is in the making."""
+        return self._work is not None
+
+    def poll(self, engine: Engine) -> OverlayAnswer | None:
+        """The overlay, once it is made. Raises NotReadyError where its time is up before it can be shown.
+
+        What is in the making is made to its end: where an edit comes between, of the revision before.
+        """
+        if self._work is None:
+            if not self._may_begin(engine):
+                return None
+            self._work = engine.overlay(self._request.overlay)
+        start = time.monotonic()
+        while time.monotonic() - start < self._budget:
+            try:
+                next(self._work)
+            except StopIteration as end:
+                return OverlayAnswer(encode_overlay(end.value, self._request.format))
+        return None
+
+    def _may_begin(self, engine: Engine) -> bool:
+        asked = self._request.overlay
+        if engine.is_overlay_ready(asked, asked.complete):
+            return True
+        if time.monotonic() < self.deadline:
+            return False
+        if not engine.is_overlay_ready(asked, complete=False):
+            raise still_missing(asked.overlay.needs)
+        return True
