@@ -117,14 +117,17 @@ class Engine:
             self._settle(self._world, self._solution)
 
     def step(self, budget: float) -> bool:
-        """Work for about `budget` seconds; True while more work remains."""
+        """Work for about `budget` seconds; False if nothing needed any.
+
+        So, when it is False, whoever waits for something has seen what the last of the work came to.
+        """
         solving = self._solution.state is SessionState.SOLVING
         refining = self._fine is not None and self._fine.step(0.5 * budget)
         gathering = self._gathers is not None and self._gathers.step(0.5 * budget)
         busy = solving or refining or gathering
         tracing = self._paths.step(0.5 * budget if busy else budget, self._settings.error_tolerance)
-        solving = self._solution.step(0.5 * budget if tracing else budget)
-        return solving or refining or gathering or tracing
+        self._solution.step(0.5 * budget if tracing else budget)
+        return busy or tracing
 
     def build_everything(self) -> None:
         """Build the interpolants of all triangles, seen or not, once there are any."""

@@ -140,13 +140,14 @@ class FineLight:
             self._is_resting = False
 
     def step(self, budget: float) -> bool:
-        """Work for about `budget` seconds; True while more work remains."""
+        """Work for about `budget` seconds; False if nothing needed any."""
         start = time.perf_counter()
+        needed = self._has_work()
         while self._has_work():
             next(self._work)
             if time.perf_counter() - start >= budget:
                 break
-        return self._has_work()
+        return needed
 
     def _has_work(self) -> bool:
         preparing = self._is_preparing and self._point is None

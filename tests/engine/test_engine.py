@@ -48,6 +48,17 @@ def test_an_engine_starts_unsolved_and_converges(engine: Engine) -> None:
     assert not engine.step(0.1), "nothing is left to do"
 
 
+def test_who_waits_sees_what_the_last_step_came_to(engine: Engine) -> None:
+    """The step that ends the solve is not idle: what waits for its light is asked again, and begun."""
+    while engine.status().state is SessionState.SOLVING:
+        assert engine.step(10.0)
+    assert not engine.step(10.0)
+    request = FrameRequest()
+    assert engine.outlook(request).improving
+    while not engine.outlook(request).converged:
+        assert engine.step(10.0)
+
+
 def test_progress_never_goes_back(drawing: Drawing) -> None:
     engine = Engine(box(), LightSettings(error_tolerance=0.005), drawing=drawing)
     told = [engine.status().progress]

@@ -103,9 +103,7 @@ class LinksOverlay(Overlay):
         )
 
 
-def _crossing(
-    state: TransportState, first: IntArray, second: IntArray
-) -> Generator[None, None, BoolArray]:
+def _crossing(state: TransportState, first: IntArray, second: IntArray) -> Generator[None, None, BoolArray]:
     """(n,) whether one of two elements (n,) reaches through the plane of the other."""
     tree = state.tree
     tolerance = tolerances.SIDE * state.surfaces.size
