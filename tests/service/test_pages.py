@@ -10,7 +10,6 @@ from prometheus_client.parser import text_string_to_metric_families
 from service import openapi
 from service.app import create_app
 
-
 OVERLAYS = (
     "mesh", "links", "blockers", "discontinuities", "triangulation", "samples", "graph", "probe",
 )  # fmt: skip

@@ -54,8 +54,14 @@ class MeshOverlay(Overlay):
         shown = self.page.of(ids)
         patch = tree.patch[shown]
         corners, count = tree.corners[shown], tree.corner_count[shown]
-        radiosity = mean_radiosity(tree, subject.solution.field(), shown)
-        colour, scale = self._colours(radiosity, surfaces.emission[patch], surfaces.reflectance[patch])
+        field = subject.solution.field()
+        radiosity = mean_radiosity(tree, field, shown)
+        emits = np.asarray(surfaces.emission.any(axis=1))
+        colour, scale = surfaces.reflectance[patch], 1.0
+        if self.colour is MeshColour.RADIOSITY:
+            # The brightest leaf that only reflects is drawn as 1, whatever is shown of the elements.
+            scale = float(field.radiosity[~emits[field.patch]].max(initial=0.0))
+            colour = np.where(emits[patch, None], WHITE, _shades(radiosity, scale))
         return Shown(
             name=self.name,
             revision=subject.revision,
@@ -84,16 +90,10 @@ class MeshOverlay(Overlay):
             shapes=Shapes(lines=outlines(corners, count, BLACK), triangles=faces(corners, count, colour)),
         )
 
-    def _colours(
-        self, radiosity: Spectra, emission: Spectra, reflectance: Spectra
-    ) -> tuple[FloatArray, float]:
-        """Colours (n, 3), and the radiosity in W/m2 that is drawn as 1."""
-        if self.colour is MeshColour.RHO:
-            return reflectance, 1.0
-        emits = np.asarray(emission.any(axis=1))
-        scale = float(radiosity[~emits].max(initial=0.0))
-        shade = radiosity.clip(0.0, None) / scale if scale > 0.0 else np.zeros_like(radiosity)
-        return np.where(emits[:, None], WHITE, shade.clip(None, 1.0)), scale
+
+def _shades(radiosity: Spectra, scale: float) -> FloatArray:
+    """(n, 3) colours; `scale` in W/m2 is drawn as 1."""
+    return (radiosity / scale).clip(0.0, 1.0) if scale > 0.0 else np.zeros_like(radiosity)
 
 
 def depths(tree: ElementTree) -> IntArray:
