@@ -153,8 +153,9 @@ def test_graphs_have_limits(engine: Engine) -> None:
 def test_a_probe_is_the_same_by_pixel_and_by_point(engine: Engine) -> None:
     for x, y in ((5, 40), (12, 20), (30, 25)):
         seen = table(engine, ProbeOverlay(Pixel(x, y)))
-        place = SurfacePoint(*seen["position"][0].tolist(), int(seen["patch"][0]))
-        given = table(engine, ProbeOverlay(place))
+        place = seen["position"][0].tolist()
+        point = SurfacePoint(x=place[0], y=place[1], z=place[2], patch=int(seen["patch"][0]))
+        given = table(engine, ProbeOverlay(point))
         for name, column in seen.items():
             np.testing.assert_allclose(given[name], column, rtol=1e-9, atol=1e-12, err_msg=name)
 

@@ -70,14 +70,15 @@ def test_picks_are_what_frames_show(drawing: Drawing) -> None:
     assert point is not None and not point.has_interpolant
 
     show(engine, TriangulationOverlay())
-    for camera in (CameraChoice(), SIDE):
+    for camera in (CameraChoice(), SIDE, BELOW):
         check(engine, camera, RendererName.INTERPOLANT)
         triangles = engine.frame(FrameRequest(camera, RendererName.INTERPOLANT, LayerName.TRIANGLE)).image
         weights = engine.frame(FrameRequest(camera, RendererName.INTERPOLANT, LayerName.BARYCENTRIC)).image
-        point = engine.pick(camera, 16, 12).point
+        y, x = np.argwhere(triangles >= 0)[0].tolist()
+        point = engine.pick(camera, x, y).point
         assert point is not None and point.has_interpolant
-        assert point.seen.triangle == triangles[12, 16]
-        np.testing.assert_allclose(point.seen.barycentric, weights[12, 16], atol=1e-6)
+        assert point.seen.triangle == triangles[y, x]
+        np.testing.assert_allclose(point.seen.barycentric, weights[y, x], atol=1e-6)
 
 
 def test_elements_are_those_of_the_hierarchy(engine: Engine) -> None:
