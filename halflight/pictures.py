@@ -8,7 +8,6 @@ from solver.document.limits import SceneLimits
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.requests import FrameRequest
-from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.geometry.scene import Scene
 from solver.illumination.settings import LightSettings
@@ -52,7 +51,7 @@ class Picture(Protocol):
 
 
 class RadiosityPicture:
-    """The radiosity solution, drawn once it is within the tolerance."""
+    """A frame of the radiosity solution, drawn once it is within the tolerance and all in view is built."""
 
     def __init__(self, scene: Scene, request: FrameRequest, tolerance: float, drawing: Drawing) -> None:
         """Raises SceneError, NotAvailableError, RenderingUnavailableError where it could not be drawn."""
@@ -62,24 +61,25 @@ class RadiosityPicture:
 
     @property
     def progress(self) -> float:
-        """Of the solve."""
+        """Of the solve; what is built on it is done in little time."""
         return self._engine.status().progress
 
     @property
     def error_estimate(self) -> float:
-        """Of the radiosities."""
-        return self._engine.status().error_estimate
+        """Of the frame."""
+        return self._engine.outlook(self._request).error_estimate
 
     @property
     def converged(self) -> bool:
-        """Whether the solve has reached its tolerance."""
-        return self._engine.status().state is SessionState.CONVERGED
+        """Whether it has reached its tolerance, and is complete."""
+        return self._engine.outlook(self._request).converged
 
     @property
     def summary(self) -> str:
-        """Elements and links."""
-        statistics = self._engine.status().statistics
-        return f"{statistics.elements:,} elements, {statistics.links:,} links"
+        """Elements, links, and what is built on them."""
+        status = self._engine.status()
+        told = f"{status.statistics.elements:,} elements, {status.statistics.links:,} links"
+        return f"{told}, {status.fine.interpolants:,} interpolants" if status.fine.interpolants else told
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -87,8 +87,9 @@ class RadiosityPicture:
         return self._engine.status().warnings
 
     def step(self, budget: float) -> bool:
-        """Solve on."""
-        return self._engine.step(budget)
+        """Work on."""
+        self._engine.step(budget)
+        return self._engine.outlook(self._request).improving
 
     def draw(self) -> AnyArray:
         """The frame."""

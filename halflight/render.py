@@ -29,6 +29,8 @@ class Renderer(StrEnum):
 
     FLAT = "flat"
     GOURAUD = "gouraud"
+    INTERPOLANT = "interpolant"
+    GATHER = "gather"
     PATH = "path"
 
 
@@ -43,6 +45,10 @@ class Layer(StrEnum):
     NORMAL = "normal"
     OBJECT = "object"
     ELEMENT = "element"
+    TRIANGLE = "triangle"
+    BARYCENTRIC = "barycentric"
+    ERROR = "error"
+    FALSE_COLOUR = "false_colour"
 
 
 class ToneMap(StrEnum):
@@ -63,7 +69,7 @@ def render(
             ".exr .hdr .npy hold linear values.",
         ),
     ],
-    renderer: Annotated[Renderer, typer.Option(help="How the picture is made.")] = Renderer.GOURAUD,
+    renderer: Annotated[Renderer, typer.Option(help="How the picture is made.")] = Renderer.INTERPOLANT,
     layer: Annotated[Layer, typer.Option(help="What it shows.")] = Layer.RADIANCE,
     camera: Annotated[str | None, typer.Option(help="A camera of the scene.", show_default="main")] = None,
     eye: Annotated[str | None, typer.Option(help="Where the camera stands.", metavar="X,Y,Z")] = None,
@@ -98,7 +104,7 @@ def render(
     """
     from halflight.pictures import PathPicture, RadiosityPicture
     from solver.engine.drawing import Drawing, encode
-    from solver.engine.requests import Encoding, FrameRequest, LayerName, RendererName
+    from solver.engine.requests import Encoding, FrameRequest, LayerName, NotAvailableError, RendererName
     from solver.errors import LimitExceededError, RenderingUnavailableError, SceneError
     from solver.rendering.encoding import LinearFormat, PictureFormat
     from solver.rendering.tone_mapping import ToneCurve
@@ -138,6 +144,8 @@ def render(
     except SceneError as refused:
         # The scene has been read: what is refused is how it is to be looked at.
         fail(f"--{refused}", ExitCode.BAD_INPUT)
+    except NotAvailableError as refused:
+        fail(f"--layer: {refused}", ExitCode.BAD_INPUT)
     except LimitExceededError as refused:
         fail(str(refused), ExitCode.BAD_INPUT)
     except RenderingUnavailableError as refused:
