@@ -18,6 +18,9 @@ from solver.document.edits import MoveEdit, RemoveEdit, SetMaterialEdit
 from solver.document.models import MaterialDocument, TransformDocument
 from solver.engine.drawing import Drawing, encode
 from solver.engine.engine import Engine
+from solver.engine.overlays.base import OverlayRequest
+from solver.engine.overlays.places import Pixel
+from solver.engine.overlays.probe import ProbeOverlay
 from solver.engine.requests import (
     CameraChoice,
     Encoding,
@@ -28,8 +31,10 @@ from solver.engine.requests import (
 )
 from solver.engine.world import World
 from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
+from solver.illumination.cells import Cells, ConstraintEdges
 from solver.illumination.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
+from solver.illumination.triangulation import triangulate
 from solver.pathtracing import PathTracer
 from solver.rendering.encoding import LinearFormat, PictureFormat
 from solver.rendering.tessellation import Tessellator
@@ -158,6 +163,8 @@ def _mesh() -> None:
     scene = _room(_RED, _WARM_LIGHT, range(6))
     world, solver = _solve(scene)
     Tessellator(world.surfaces).mesh(solver.field())
+    cells, none = Cells.of(solver.field()), ConstraintEdges.none()
+    triangulate(cells, world.surfaces, none, triangulate(cells, world.surfaces, none))
 
 
 def _draw(drawing: Drawing) -> None:
@@ -170,6 +177,19 @@ def _draw(drawing: Drawing) -> None:
             engine.outlook(request)
             _run(engine)
             engine.frame(request)
+        _pick_and_probe(engine)
+
+
+def _pick_and_probe(engine: Engine) -> None:
+    """What a pixel shows, and the overlay that evaluates both its interpolant and its point irradiance."""
+    camera = engine.scene.cameras["main"]
+    middle = Pixel(camera.width // 2, camera.height // 2)
+    engine.pick(CameraChoice(), middle.x, middle.y)
+    request = OverlayRequest(ProbeOverlay(middle), CameraChoice())
+    while not engine.is_overlay_ready(request, complete=True):
+        engine.step(_SLICE)
+    for _ in engine.overlay(request):
+        pass
 
 
 def _follow_links() -> None:

@@ -70,6 +70,7 @@ for sample in ("cube_room", "office"):
                 except NotAvailableError:
                     pass
         engine.probe(np.array([[1.0, 1.0, 0.5]]), np.array([[0.0, 0.0, 1.0]]))
+        engine.pick(CameraChoice(width=16, height=12), 8, 6)
         engine.status()
         warm_light = MaterialDocument(emission=[9.0, 5.0, 1.0])
         engine.apply([
