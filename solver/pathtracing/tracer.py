@@ -63,6 +63,17 @@ class PathTracer:
         """
         return self._run(ElementSource.of(corners, corner_count, self.surfaces.normal[patch]), samples)
 
+    def element_pass(
+        self, corners: Corners, corner_count: IntArray, patch: IntArray, samples: int, number: int
+    ) -> ProgressiveEstimate:
+        """One pass of `samples` paths over elements (n, 4, 3), to be stepped; its mean is their irradiance.
+
+        Passes of different `number` are independent, and so are the elements, the same one twice included.
+        """
+        source = ElementSource.of(corners, corner_count, self.surfaces.normal[patch])
+        seed = int(np.random.SeedSequence((self._seed, number)).generate_state(1)[0])
+        return ProgressiveEstimate(self._rays, self._tables, self._emitters, source, samples, seed, 1)
+
     def _estimate(self, source: Source, samples: int, passes: int | None) -> ProgressiveEstimate:
         return ProgressiveEstimate(
             self._rays, self._tables, self._emitters, source, samples, self._seed, passes
