@@ -27,6 +27,14 @@ from solver.types import AnyArray, FloatArray
 BEST_RENDERER: Final = RendererName.INTERPOLANT
 """What draws a frame whose renderer is not named."""
 
+WITHOUT_LINKS: Final = (
+    RendererName.FLAT,
+    RendererName.GOURAUD,
+    RendererName.INTERPOLANT,
+    RendererName.PATH,
+)
+"""What draws a solution that has no links; interpolants are drawn as gouraud then."""
+
 _SHADINGS: Final = {
     RendererName.FLAT: Shading.FLAT,
     RendererName.GOURAUD: Shading.GOURAUD,

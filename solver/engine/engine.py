@@ -14,12 +14,13 @@ import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
-from solver.engine.drawing import BEST_RENDERER, Drawing
+from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
 from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.paths import PathFrames
 from solver.engine.picking import PickResult, pick_point
+from solver.engine.probing import light_at
 from solver.engine.requests import (
     CameraChoice,
     FrameLimits,
@@ -42,7 +43,6 @@ from solver.engine.views import (
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
-from solver.illumination.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
 
@@ -165,21 +165,14 @@ class Engine:
         return Frame(image, self._outlook(request, view), time.perf_counter() - start)
 
     def probe(self, positions: Points, normals: FloatArray) -> ProbeResult:
-        """The exact gather from the current solution at points (n, 3) with normals (n, 3) of any length."""
+        """Measure the light at points (n, 3) with normals (n, 3) of any length, as `light_at` does."""
         unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        fine = self._fine_light()
-        point = None if fine is None else fine.prepare()
-        error = self._solution.error_estimate if fine is None or point is None else fine.gather_error
-        if point is None:
-            solver = self._solution.solver
-            point = PointIrradiance.of(solver.state, solver.hierarchy, self._settings.point_accuracy)
-        found = np.broadcast_to(point.anywhere(positions, unit), (len(positions), 3))
-        lit = found.any(axis=1)
+        found, error = light_at(self._solution, self._fine_light(), self._settings, positions, unit)
         return ProbeResult(
             revision=self._revision,
             irradiance=found,
             illuminance=self.scene.luminous_efficacy * (found @ LUMINANCE_WEIGHTS),
-            error_estimate=np.where(lit, min(1.0, error), 0.0),
+            error_estimate=error,
         )
 
     def pick(self, camera: CameraChoice, x: int, y: int) -> PickResult:
@@ -238,20 +231,23 @@ class Engine:
             asked = self._paths.ask(camera, request.samples, request.max_error)
             return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
+        if self._solution.is_sampled and renderer is RendererName.GATHER:
+            raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
         fine = self._fine_light()
         shown = RendererName.GOURAUD if renderer is RendererName.GATHER else renderer
         view = SolutionView(self._solution, self._drawing, camera, shown, request.layer, request.samples)
         if renderer is RendererName.GATHER:
             return self._gather_view(fine, view)
-        if renderer is not RendererName.INTERPOLANT:
+        if renderer is not RendererName.INTERPOLANT or self._solution.is_sampled:
             return view
         if fine is not None:
             fine.ask(camera)
         return InterpolantView(view, fine)
 
     def _fine_light(self) -> FineLight | None:
-        """Fine light, once the solution rests."""
-        if self._fine is None and self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED):
+        """Fine light, once the solution rests; a sampled one never has any."""
+        rests = self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED)
+        if self._fine is None and rests and not self._solution.is_sampled:
             self._fine = FineLight(self._solution, self._drawing, self._settings)
         return self._fine
 

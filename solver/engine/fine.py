@@ -29,6 +29,7 @@ from solver.illumination.refinement import ViewError, cells_to_split, view_error
 from solver.illumination.settings import LightSettings
 from solver.illumination.splitting import split_cells
 from solver.illumination.triangulation import Triangulation, triangulate
+from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray, IntArray
 
 KEPT: Final = 4
@@ -45,9 +46,13 @@ class FineLight:
     """The interpolants of one solution in the making."""
 
     def __init__(self, solution: Solution, drawing: Drawing, settings: LightSettings) -> None:
+        """Nothing is built yet. Raises ValueError for a sampled solution."""
         self.version = 0
         """Counts the changes of what can be drawn."""
         self._solution = solution
+        if not isinstance(solution.solver, RadiositySolver):
+            raise ValueError("interpolants are made over links, which a sampled solution does not have")
+        self._solver = solution.solver
         self._drawing = drawing
         self._settings = settings
         self._cameras: OrderedDict[tuple[float, ...], Camera] = OrderedDict()
@@ -154,8 +159,8 @@ class FineLight:
         return preparing or (bool(self._cameras) and not self._is_resting)
 
     def _run(self) -> Iterator[None]:
-        solver, surfaces = self._solution.solver, self._solution.world.surfaces
-        state, hierarchy = solver.state, solver.hierarchy
+        surfaces = self._solution.world.surfaces
+        state, hierarchy = self._solver.state, self._solver.hierarchy
         point = PointIrradiance.of(state, hierarchy, self._settings.point_accuracy)
         yield
         state = yield from corrected(state, point)

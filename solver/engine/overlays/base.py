@@ -149,6 +149,10 @@ def is_ready(overlay: Overlay, subject: Subject, complete: bool) -> bool:
         return not complete or state is not SessionState.SOLVING
     if state is SessionState.FAILED:
         raise NotReadyError("the solve has ended with an error, which the session's warnings tell")
+    if subject.solution.is_sampled:
+        raise NotReadyError(
+            f"it needs {overlay.needs.value}, which scenes too large to link do not have: see the warnings"
+        )
     if fine is None:
         return False
     if overlay.needs is Needs.POINT:
