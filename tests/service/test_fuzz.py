@@ -29,6 +29,20 @@ OPERATIONS: Final = [
     ("POST", "/v1/sessions/{id}/edits"),
     ("GET", "/v1/sessions/{id}/frame"),
     ("POST", "/v1/sessions/{id}/probe"),
+    ("GET", "/v1/sessions/{id}/pick"),
+    *(
+        ("GET", f"/v1/sessions/{{id}}/overlays/{name}")
+        for name in (
+            "mesh",
+            "links",
+            "blockers",
+            "discontinuities",
+            "triangulation",
+            "samples",
+            "graph",
+            "probe",
+        )
+    ),
 ]
 
 QUICK: Final = settings(
