@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -12,8 +13,10 @@ from fastapi.testclient import TestClient
 from pydantic import BaseModel
 
 from service import overlay_schemas as schemas
+from service.app import create_app
 from solver.types import AnyArray
 from tests.engine.showing import room_document
+from tests.halflight.commands import ROOT
 from tests.service.conftest import LOOSE
 from tests.service.problem import fields_at_fault, problem_of
 
@@ -200,6 +203,19 @@ def test_probes_take_points_and_pixels(client: TestClient, room: str) -> None:
     assert by_pixel["triangle"] == [picked["triangle"]]
     assert by_pixel["element"] == [picked["element"]]
     assert by_pixel["interpolated"][0] == pytest.approx(picked["irradiance"], rel=1e-6)
+
+
+def test_the_examples_of_the_documentation_are_calls_that_there_are() -> None:
+    """Their answers depend on the scene; their names do not."""
+    examples = re.findall(r'"\$session(/\S*)"', (ROOT / "docs/visualizations.md").read_text())
+    paths = create_app().openapi()["paths"]
+    told = set()
+    for example in examples:
+        place, _, query = example.partition("?")
+        told.add(place.rpartition("/")[2])
+        parameters = {p["name"] for p in paths[f"/v1/sessions/{{id}}{place}"]["get"]["parameters"]}
+        assert {pair.partition("=")[0] for pair in query.split("&")} <= parameters
+    assert told == {*OVERLAYS, "pick"}
 
 
 # --- what is refused ---
