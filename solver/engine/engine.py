@@ -151,7 +151,10 @@ class Engine:
         )
 
     def outlook(self, request: FrameRequest) -> Outlook:
-        """What a frame drawn now would be. Raises NotAvailableError, SceneError, LimitExceededError."""
+        """What a frame drawn now would be.
+
+        Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
+        """
         return self._outlook(request, self._view(request))
 
     def frame(self, request: FrameRequest) -> Frame:
@@ -231,6 +234,7 @@ class Engine:
             asked = self._paths.ask(camera, request.samples, request.max_error)
             return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
+        self._drawing.require_device()
         if self._solution.is_sampled and renderer is RendererName.GATHER:
             raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
         fine = self._fine_light()

@@ -275,6 +275,9 @@ def test_without_opengl_all_but_frames_work(tmp_path: Path) -> None:
         assert "\n" not in problem["detail"]
         traced = service.http.get(f"{path}/frame", params={"renderer": "path", "wait": "converged"})
         assert traced.status_code == 200
+        assert service.http.get(f"{path}/overlays/mesh?wait=converged").status_code == 200
+        for drawn in ("frame", "pick?x=0&y=0", "overlays/triangulation"):
+            problem_of(service.http.get(f"{path}/{drawn}"), 503)
         assert service.http.get(path).status_code == 200
         assert service.http.get(f"{path}/scene").status_code == 200
         assert service.http.delete(path).status_code == 204
