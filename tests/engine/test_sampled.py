@@ -46,16 +46,16 @@ def sampled(of: World, settings: SolverSettings) -> SampledSolver:
     return solver
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Begin with few elements, which have many passes then."""
-    monkeypatch.setattr(sampled_solver, "FIRST_AREA", 1.0 / 100.0)
+    monkeypatch.setattr(sampled_solver, "FIRST_AREA", 1.0 / 200.0)
 
 
 # --- the light ---
 
 
-def test_a_furnace_is_as_bright_everywhere(coarse: None) -> None:
+def test_a_furnace_is_as_bright_everywhere() -> None:
     solver = sampled(furnace(0.5), SolverSettings(error_tolerance=0.04))
     assert solver.outcome is SolveOutcome.CONVERGED
     assert solver.statistics().closed
@@ -65,7 +65,7 @@ def test_a_furnace_is_as_bright_everywhere(coarse: None) -> None:
     assert abs(field.area @ off / field.area.sum()) < 2e-3
 
 
-def test_walls_of_a_lit_cube_agree_with_the_reference(coarse: None) -> None:
+def test_walls_of_a_lit_cube_agree_with_the_reference() -> None:
     solver = sampled(lit_cube(), SolverSettings(error_tolerance=0.025))
     field = solver.field()
     area = np.bincount(field.patch, field.area)
@@ -92,7 +92,7 @@ def measured_errors(of: World, solver: SampledSolver, samples: int = 4096) -> tu
 
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.04])
-def test_the_estimate_covers_the_error(tolerance: float, coarse: None) -> None:
+def test_the_estimate_covers_the_error(tolerance: float) -> None:
     of = World.of(box())
     solver = sampled(of, SolverSettings(error_tolerance=tolerance))
     assert solver.outcome is SolveOutcome.CONVERGED
@@ -101,7 +101,7 @@ def test_the_estimate_covers_the_error(tolerance: float, coarse: None) -> None:
     assert error > 0.1 * solver.error_estimate, "the estimate is no mere bound"
 
 
-def test_noise_falls_with_the_square_root_of_the_paths(coarse: None) -> None:
+def test_noise_falls_with_the_square_root_of_the_paths() -> None:
     """Between two moments of one solve whose elements stay the same."""
     of = lit_cube()
     solver = SampledSolver(of.surfaces, of.rays, SolverSettings(error_tolerance=1e-3, max_elements=0))
@@ -116,7 +116,7 @@ def test_noise_falls_with_the_square_root_of_the_paths(coarse: None) -> None:
     assert -0.8 < slope < -0.3, (rays, errors)
 
 
-def test_elements_split_where_light_varies(coarse: None) -> None:
+def test_elements_split_where_light_varies() -> None:
     """On the floor below the crate, whose shadow has edges, and less in the open."""
     of = World.of(box())
     field = sampled(of, SolverSettings(error_tolerance=0.03)).field()
