@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from solver.illumination.arrangement_kernels import arrange_cells
-from solver.illumination.cells import Cells, ConstraintEdges
+from solver.illumination.cells import ConstraintEdges
 from solver.illumination.crossings import Chords
 from solver.illumination.rails import RailPoints, add_points
 from solver.illumination.rings import Rings, trace_rings
@@ -58,34 +58,19 @@ class Arrangement:
 
 
 def arrange(
-    chords: Chords,
-    points: RailPoints,
-    cells: Cells,
-    edges: ConstraintEdges,
-    skeleton: Skeleton,
-    axes: FloatArray,
+    chords: Chords, points: RailPoints, edges: ConstraintEdges, skeleton: Skeleton
 ) -> tuple[Arrangement, Rings]:
-    """The arrangement of `chords` in `cells`, and the outlines with all points that it takes.
-
-    `axes` (p, 2, 3) span the planes of the patches.
-    """
+    """The arrangement of `chords`, which are parts of `edges`, and rings with all points that it takes."""
     while True:
         rings = trace_rings(skeleton, points)
-        found = _arrange_once(chords, cells, edges, skeleton, rings, axes)
+        found = _arrange_once(chords, edges, skeleton, rings)
         count = len(points.rail)
-        points, _ = add_points(points, found.wanted_rail, found.wanted_fraction, skeleton)
+        points, _ = add_points(points, found.wanted_rail, found.wanted_fraction)
         if len(points.rail) == count:
             return found, rings
 
 
-def _arrange_once(
-    chords: Chords,
-    cells: Cells,
-    edges: ConstraintEdges,
-    skeleton: Skeleton,
-    rings: Rings,
-    axes: FloatArray,
-) -> Arrangement:
+def _arrange_once(chords: Chords, edges: ConstraintEdges, skeleton: Skeleton, rings: Rings) -> Arrangement:
     crossed, first = np.unique(chords.cell, return_index=True)
     chord_start = np.append(first, len(chords.cell)).astype(np.int32)
     found: dict[int, tuple[AnyArray, ...]] = {}
@@ -106,15 +91,11 @@ def _arrange_once(
             rings.low,
             rings.high,
             rings.position,
-            rings.radius,
             skeleton.side,
             skeleton.rail,
-            skeleton.reach,
             skeleton.center,
-            skeleton.diameter,
+            skeleton.axes,
             skeleton.tolerance,
-            axes,
-            cells.patch,
         )
 
     run_chunks(work, len(crossed), _CHUNK, least=16)

@@ -1,4 +1,4 @@
-"""The kernel of `arrangement`: one cell after the other, in a frame of its own where its diameter is 1."""
+"""The kernel of `arrangement`: one cell after the other, each in its own frame."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.illumination.cell_plane import (
     beside,
+    find_radii,
     intersect,
     line_met,
     project,
@@ -39,15 +40,11 @@ def arrange_cells(
     low: FloatArray,
     high: FloatArray,
     position: Points,
-    node_radius: FloatArray,
     side: IntArray,
     rail: IntArray,
-    reach: FloatArray,
     center: Points,
-    diameter: FloatArray,
-    tolerance: FloatArray,
     axes: FloatArray,
-    patch: IntArray,
+    tolerance: FloatArray,
 ) -> tuple[
     IntArray,
     FloatArray,
@@ -82,22 +79,20 @@ def arrange_cells(
         cell = crossed[index]
         ring = ring_start[cell]
         count = ring_start[cell + 1] - ring
-        scale = 1.0 / diameter[cell]
-        u = axes[patch[cell], 0]
-        v = axes[patch[cell], 1]
-        inner_radius = tolerance[cell] * scale
+        frame = axes[cell]
+        inner_radius = tolerance[cell]
         # The ring, and where its sides begin.
         total = count
         sides = 0
         for i in range(count):
             if i >= len(xy):
                 xy, radius = _wider(xy), _longer(radius)
-            project(position[ring_stop[ring + i]], center[cell], u, v, scale, xy[i])
-            radius[i] = node_radius[ring_stop[ring + i]] * scale
+            project(position[ring_stop[ring + i]], center[cell], frame, xy[i])
             if i == 0 or side[ring_piece[ring + i]] != side[ring_piece[ring + i - 1]]:
                 corner[sides] = i
                 sides += 1
         corner[sides] = count
+        find_radii(xy, radius, count, corner, sides, inner_radius)
         # The chords, and their ends within the cell; the first chord lies on top.
         left = 0
         lines = 0
@@ -107,7 +102,7 @@ def arrange_cells(
             for k in range(2):
                 code = chord_from[c] if k == 0 else chord_to[c]
                 if code < 0:
-                    project(ends[(-1 - code) >> 1, (-1 - code) & 1], center[cell], u, v, scale, point)
+                    project(ends[(-1 - code) >> 1, (-1 - code) & 1], center[cell], frame, point)
                     found = vertex_near(xy, radius, total, point, inner_radius)
                     if found < 0:
                         if total >= len(xy):
@@ -177,7 +172,7 @@ def arrange_cells(
             intersect(xy[a], xy[b], xy[c], xy[d], point)
             near = vertex_near(xy, radius, total, point, inner_radius)
             if near < 0:
-                near, t = stretch_near(xy, count, point, ring, ring_piece, reach, scale)
+                near, t = stretch_near(xy, count, point, inner_radius, low, high, ring)
                 if t > 0.0:
                     # On a side: ask for it, and go on with a vertex that the next attempt will find there.
                     if wanted_total >= len(wanted):
@@ -215,7 +210,7 @@ def arrange_cells(
                     vertices, vertex_cell = _wider(vertices), _longer_ids(vertex_cell)
                 for axis in range(3):
                     vertices[vertex_total, axis] = (
-                        center[cell, axis] + (xy[i, 0] * u[axis] + xy[i, 1] * v[axis]) / scale
+                        center[cell, axis] + xy[i, 0] * frame[0, axis] + xy[i, 1] * frame[1, axis]
                     )
                 vertex_cell[vertex_total] = cell
                 vertex_total += 1

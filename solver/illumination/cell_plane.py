@@ -5,23 +5,57 @@ The first `count` vertices are the ring of the cell.
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from solver.kernels import inline_kernel
+from solver.illumination.rails import APART
+from solver.illumination.skeleton import MINIMUM_LENGTH
+from solver.kernels import inline_kernel, kernel
 from solver.types import FloatArray, IntArray
+
+_CLEAR: Final = 1.25 * APART
+"""A stretch gets a new point if this part of its rail is free on either side: more than points must be apart,
+so that rounding never refuses one that was asked for."""
 
 
 @inline_kernel
-def project(
-    x: FloatArray, center: FloatArray, u: FloatArray, v: FloatArray, scale: float, at: FloatArray
+def project(x: FloatArray, center: FloatArray, frame: FloatArray, at: FloatArray) -> None:
+    """Write the coordinates of x (3,) in a cell's frame (2, 3)."""
+    for k in range(2):
+        square = 0.0
+        at[k] = 0.0
+        for axis in range(3):
+            at[k] += (x[axis] - center[axis]) * frame[k, axis]
+            square += frame[k, axis] ** 2
+        at[k] /= square
+
+
+@kernel
+def find_radii(
+    xy: FloatArray, radius: FloatArray, count: int, corner: IntArray, sides: int, most: float
 ) -> None:
-    """Write the coordinates of x (3,) in a cell's frame."""
-    at[0] = 0.0
-    at[1] = 0.0
-    for axis in range(3):
-        d = (x[axis] - center[axis]) * scale
-        at[0] += d * u[axis]
-        at[1] += d * v[axis]
+    """Radii of the vertices of a ring: half the distance of any two at most, a quarter of that of sides.
+
+    `corner` (sides + 1,) tells where sides begin. In a corner that is acute, both sides are near.
+    """
+    radius[:count] = most
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        half = 0.5 * np.sqrt((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2)
+        radius[i] = min(radius[i], half)
+        radius[j] = min(radius[j], half)
+    for i in range(count):
+        for s in range(sides):
+            a = corner[s]
+            b = corner[s + 1] if s + 1 < sides else 0
+            if a <= i <= corner[s + 1] or (i == 0 and b == 0):
+                continue
+            along, _ = beside(xy, xy[i], a, b)
+            along = min(1.0, max(0.0, along))
+            x = xy[a, 0] + along * (xy[b, 0] - xy[a, 0]) - xy[i, 0]
+            y = xy[a, 1] + along * (xy[b, 1] - xy[a, 1]) - xy[i, 1]
+            radius[i] = min(radius[i], 0.25 * np.sqrt(x * x + y * y))
 
 
 @inline_kernel
@@ -67,14 +101,23 @@ def vertex_near(xy: FloatArray, radius: FloatArray, total: int, point: FloatArra
 @inline_kernel
 def vertex_beside(xy: FloatArray, radius: FloatArray, total: int, a: int, b: int) -> int:
     """The vertex nearest to the line a - b, of those that it comes nearer to than their radius, or -1."""
+    dx = xy[b, 0] - xy[a, 0]
+    dy = xy[b, 1] - xy[a, 1]
+    square = dx * dx + dy * dy
     found = -1
     nearest = np.inf
     for i in range(total):
-        if i in (a, b):
-            continue
-        along, square = beside(xy, xy[i], a, b)
-        if 0.0 < along < 1.0 and square < radius[i] * radius[i] and square < nearest:
-            nearest = square
+        ex = xy[i, 0] - xy[a, 0]
+        ey = xy[i, 1] - xy[a, 1]
+        along = dx * ex + dy * ey
+        off = (dx * ey - dy * ex) ** 2
+        if (
+            0.0 < along < square
+            and off < radius[i] * radius[i] * square
+            and off < nearest
+            and i not in (a, b)
+        ):
+            nearest = off
             found = i
     return found
 
@@ -128,25 +171,24 @@ def stretch_near(
     xy: FloatArray,
     count: int,
     point: FloatArray,
+    within: float,
+    low: FloatArray,
+    high: FloatArray,
     ring: int,
-    piece: IntArray,
-    reach: FloatArray,
-    scale: float,
 ) -> tuple[int, float]:
     """The stretch of the ring that `point` is on, and where; t is 0 where it is one of its ends; or -1.
 
-    A point that is on a stretch is moved onto it.
+    Stretches run from `low` to `high` on their rails, those of the ring from `ring` on. A point that is on a
+    stretch is moved onto it.
     """
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
         along, square = beside(xy, point, i, j)
-        near = reach[piece[ring + i]] * scale
-        if 0.0 < along < 1.0 and square < near * near:
-            length = np.sqrt((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2)
-            if along * length < 2.0 * near:
-                return i, 0.0
-            if (1.0 - along) * length < 2.0 * near:
-                return j, 0.0
+        part = abs(high[ring + i] - low[ring + i])
+        length = ((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2) / (part * part)
+        if 0.0 < along < 1.0 and square < min(within * within, MINIMUM_LENGTH * MINIMUM_LENGTH * length):
+            if min(along, 1.0 - along) * part < _CLEAR:
+                return (i if along < 0.5 else j), 0.0
             point[0] = xy[i, 0] + along * (xy[j, 0] - xy[i, 0])
             point[1] = xy[i, 1] + along * (xy[j, 1] - xy[i, 1])
             return i, along

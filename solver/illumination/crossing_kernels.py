@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from solver.illumination.rails import APART
 from solver.kernels import inline_kernel, kernel
 from solver.types import BoolArray, FloatArray, IntArray, Points
 
@@ -108,9 +109,7 @@ def find_stops(
                 along = _along(p, q, a) + t * (_along(p, q, b) - _along(p, q, a))
                 if 0.0 <= along <= 1.0:
                     where[total] = along
-                    _put_on_rail(
-                        stops, fraction, total, cell, c, i, t, node, end, rail, forward, position, reach
-                    )
+                    _put_on_rail(stops, fraction, total, cell, c, i, t, node, end, rail, forward)
                     total += 1
         for k in range(2):
             piece, t = _locate(
@@ -123,9 +122,7 @@ def find_stops(
             if piece == _INSIDE:
                 _put(stops, fraction, total, cell, c, -1, -1 - (2 * c + k), 0.0)
             else:
-                _put_on_rail(
-                    stops, fraction, total, cell, c, piece, t, node, end, rail, forward, position, reach
-                )
+                _put_on_rail(stops, fraction, total, cell, c, piece, t, node, end, rail, forward)
             total += 1
         if total - begin < 2:
             total = begin
@@ -174,18 +171,13 @@ def _put_on_rail(
     end: IntArray,
     rail: IntArray,
     forward: BoolArray,
-    position: Points,
-    reach: FloatArray,
 ) -> None:
     """Stop at t on the rail of a piece; near one of its ends, at the node there."""
-    r = rail[piece]
-    length = _distance(position[node[r]], position[end[r]])
-    if t * length < 2.0 * reach[r]:
-        _put(stops, fraction, at, cell, c, -1, node[piece] if forward[piece] else end[piece], 0.0)
-    elif (1.0 - t) * length < 2.0 * reach[r]:
-        _put(stops, fraction, at, cell, c, -1, end[piece] if forward[piece] else node[piece], 0.0)
+    if APART <= t <= 1.0 - APART:
+        _put(stops, fraction, at, cell, c, rail[piece], 0, t)
     else:
-        _put(stops, fraction, at, cell, c, r, 0, t)
+        is_start = (t < 0.5) == forward[piece]
+        _put(stops, fraction, at, cell, c, -1, node[piece] if is_start else end[piece], 0.0)
 
 
 @kernel

@@ -72,7 +72,7 @@ def find_chords(
     cell, constraint, rail, code = stops.T
     # Stops on rails become points, those that are near each other one.
     on_rail = np.flatnonzero(rail >= 0)
-    points, point = add_points(RailPoints.none(), rail[on_rail], fraction[on_rail], skeleton)
+    points, point = add_points(RailPoints.none(), rail[on_rail], fraction[on_rail])
     code = code.copy()
     code[on_rail] = len(skeleton.position) + point
     # Chords run between the stops of one edge in one cell that follow each other.

@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import pythoncdt
 
 from solver.errors import SolverError
+from solver.illumination.cell_plane import project
 from solver.illumination.linework import Linework
 from solver.illumination.patterns import pattern_triangles
+from solver.illumination.skeleton import Skeleton
 from solver.illumination.tiling import settle_tiling
 from solver.kernels import kernel
 from solver.types import BoolArray, FloatArray, IntArray, Points
+
+_SQUARE: Final = 4.0
+"""Side of the square that a cell has to itself, in diameters."""
 
 
 class TriangulationError(SolverError):
@@ -40,15 +45,15 @@ class CellTriangles:
 
 
 def triangulate_cells(
-    lines: Linework, chosen: BoolArray, normals: FloatArray, axes: FloatArray
+    lines: Linework, chosen: BoolArray, normals: FloatArray, skeleton: Skeleton
 ) -> CellTriangles:
-    """Triangles of the cells of the patches that are `chosen` (p,), with normals (p, 3), axes (p, 2, 3).
+    """Triangles of the cells of the patches that are `chosen` (p,), with normals (p, 3).
 
     Raises TriangulationError where triangles do not tile a cell.
     """
     cells = np.flatnonzero(chosen[lines.cell_patch]).astype(np.int32)
     triangles, cell, left = pattern_triangles(lines, cells)
-    cut, cut_cell = _constrained(lines, left, axes)
+    cut, cut_cell = _constrained(lines, left, skeleton)
     cell = np.concatenate([cell, cut_cell])
     order = np.argsort(cell, kind="stable")
     triangles, cell = np.concatenate([triangles, cut])[order], cell[order]
@@ -58,7 +63,7 @@ def triangulate_cells(
     return CellTriangles(triangles, cell)
 
 
-def _constrained(lines: Linework, cells: IntArray, axes: FloatArray) -> tuple[IntArray, IntArray]:
+def _constrained(lines: Linework, cells: IntArray, skeleton: Skeleton) -> tuple[IntArray, IntArray]:
     """Triangles (t, 3) of cells with lines in them, and the cell of each."""
     if len(cells) == 0:
         return np.empty((0, 3), dtype=np.int32), np.empty(0, dtype=np.int32)
@@ -77,8 +82,9 @@ def _constrained(lines: Linework, cells: IntArray, axes: FloatArray) -> tuple[In
     node = np.empty(vertex_start[-1], dtype=np.int32)
     edge = np.empty((edge_start[-1], 2), dtype=np.int32)
     _lay_out(
-        cells, patch, place, across, axes, lines.ring_start, lines.ring, lines.inner_start, lines.inner,
-        lines.edge_start, lines.edge, lines.node_start, lines.position, point, node, edge,
+        cells, patch, place, across, skeleton.center, skeleton.axes, lines.ring_start, lines.ring,
+        lines.inner_start, lines.inner, lines.edge_start, lines.edge, lines.node_start, lines.position, point,
+        node, edge,
     )  # fmt: skip
     parts = []
     for begin, end in pairwise(bounds.tolist()):
@@ -109,6 +115,7 @@ def _lay_out(
     patch: IntArray,
     place: IntArray,
     across: IntArray,
+    center: Points,
     axes: FloatArray,
     ring_start: IntArray,
     ring: IntArray,
@@ -124,38 +131,21 @@ def _lay_out(
 ) -> None:
     """Points (k, 2) of all cells, each cell in its own square; their nodes (k,), and edges (e, 2) of points.
 
-    Cells are scaled alike in both directions, so that Delaunay's criterion is that of the plane.
+    They are laid out in their frames, so that Delaunay's criterion is that of the plane but for needles.
     """
     vertex = 0
     line = 0
     for i in range(len(cells)):
         cell = cells[i]
-        p = patch[i]
         begin = vertex
         length = ring_start[cell + 1] - ring_start[cell]
-        origin = position[node_start[p] + ring[ring_start[cell]]]
-        low_x = low_y = np.inf
-        high_x = high_y = -np.inf
         for k in range(length + inner_start[cell + 1] - inner_start[cell]):
             n = ring[ring_start[cell] + k] if k < length else inner[inner_start[cell] + k - length]
-            x = 0.0
-            y = 0.0
-            for axis in range(3):
-                d = position[node_start[p] + n, axis] - origin[axis]
-                x += d * axes[p, 0, axis]
-                y += d * axes[p, 1, axis]
-            point[vertex, 0] = x
-            point[vertex, 1] = y
             node[vertex] = n
+            project(position[node_start[patch[i]] + n], center[cell], axes[cell], point[vertex])
+            point[vertex, 0] += _SQUARE * (place[i] % across[i])
+            point[vertex, 1] += _SQUARE * (place[i] // across[i])
             vertex += 1
-            low_x = min(low_x, x)
-            low_y = min(low_y, y)
-            high_x = max(high_x, x)
-            high_y = max(high_y, y)
-        size = max(high_x - low_x, high_y - low_y)
-        for k in range(begin, vertex):
-            point[k, 0] = (point[k, 0] - low_x) / size + 2.0 * (place[i] % across[i])
-            point[k, 1] = (point[k, 1] - low_y) / size + 2.0 * (place[i] // across[i])
         for k in range(length):
             edges[line, 0] = begin + k
             edges[line, 1] = begin + (k + 1) % length

@@ -14,8 +14,10 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.gather_anywhere import gather_anywhere
+from solver.illumination.gather_over_links import Table, gather_over_links
 from solver.illumination.light import Lamps, LinksByElement, Sources
-from solver.illumination.point_kernels import gather_anywhere, gather_on_surfaces
+from solver.illumination.source_light import Elements, Light
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
@@ -115,16 +117,14 @@ class PointIrradiance:
 
         All patches are asked.
         """
-        tree, light, h = self.tree, self.light, self.hierarchy
+        h, size = self.hierarchy, self.surfaces.size
+        elements, light = self._elements(), _light(self.light)
         out = np.empty((len(positions), self.emission.shape[1]))
-        size = self.surfaces.size
 
         def work(start: int, stop: int) -> None:
             gather_anywhere(
-                positions, normals, self.accuracy, h.low, h.high, h.skip, h.first, h.count, h.order,
-                tree.patch_count, tree.child, tree.child_count, tree.corners, tree.corner_count, tree.patch,
-                tree.centroid, tree.axes, tree.patch_normal, light.functions, light.luminance, light.spread,
-                light.slope, light.extent, tolerances.SIDE * size, _ON_SURFACE * size, start, stop, out,
+                positions, normals, self.accuracy, h.low, h.high, h.skip, h.first, h.count, h.order, elements,
+                light, tolerances.SIDE * size, _ON_SURFACE * size, _ON_PLANE * size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)
@@ -136,26 +136,37 @@ class PointIrradiance:
         lamps: Lamps,
         positions: Points,
         normals: FloatArray,
-        elements: IntArray,
+        leaves: IntArray,
     ) -> Spectra:
-        tree, links, light = self.tree, self.links, self.reflected
-        out = np.empty((len(positions), self.emission.shape[1]))
-        expected = np.maximum(self.solved(positions, elements) @ self.weights, 0.0)
+        links = self.links
+        elements, light = self._elements(), _light(self.reflected)
+        over = Table(
+            by_element.first, by_element.other, by_element.link, links.kind, links.visibility,
+            links.blocker_start, links.blocker_count, links.pool,
+        )  # fmt: skip
+        lit = Table(
+            lamps.first, lamps.patch, np.arange(len(lamps.patch), dtype=np.int32), lamps.kind, np.empty(0),
+            lamps.blocker_start, lamps.blocker_count, lamps.pool,
+        )  # fmt: skip
         most = max(int(links.blocker_count.max(initial=0)), int(lamps.blocker_count.max(initial=0)))
+        expected = np.maximum(self.solved(positions, leaves) @ self.weights, 0.0)
+        out = np.empty((len(positions), self.emission.shape[1]))
 
         def work(start: int, stop: int) -> None:
-            gather_on_surfaces(
-                positions, normals, elements, expected, self.accuracy, tree.parent, by_element.first,
-                by_element.link, by_element.other, links.kind, links.visibility,
-                links.blocker_start, links.blocker_count, links.pool, lamps.first, lamps.patch, lamps.kind,
-                lamps.blocker_start, lamps.blocker_count, lamps.pool, self.emission, tree.child,
-                tree.child_count, tree.corners, tree.corner_count, tree.patch, tree.centroid, tree.axes,
-                tree.patch_normal, light.functions, light.luminance, light.spread, light.slope,
-                light.extent, most, _ON_PLANE * self.surfaces.size, start, stop, out,
+            gather_over_links(
+                positions, normals, leaves, expected, self.accuracy, self.tree.parent, over, lit,
+                self.emission, elements, light, most, _ON_PLANE * self.surfaces.size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)
         return out
+
+    def _elements(self) -> Elements:
+        tree = self.tree
+        return Elements(
+            tree.child, tree.child_count, tree.corners, tree.corner_count, tree.patch, tree.centroid,
+            tree.axes, tree.patch_normal,
+        )  # fmt: skip
 
     def solved(self, positions: Points, elements: IntArray) -> Spectra:
         """Irradiance (n, channels) at points on leaves by the solution's own linear functions."""
@@ -163,3 +174,7 @@ class PointIrradiance:
         place = np.einsum("nka,na->nk", tree.axes[tree.patch[elements]], positions - tree.centroid[elements])
         functions = self.received[elements]
         return np.asarray(functions[:, 0] + np.einsum("nk,nkc->nc", place, functions[:, 1:]))
+
+
+def _light(sources: Sources) -> Light:
+    return Light(sources.functions, sources.luminance, sources.spread, sources.slope, sources.extent)

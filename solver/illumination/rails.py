@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from solver.illumination.skeleton import Skeleton
+from solver.illumination.skeleton import MINIMUM_LENGTH, Skeleton
 from solver.kernels import kernel
 from solver.types import FloatArray, Int64Array, IntArray, Points
+
+APART: Final = 2.0 * MINIMUM_LENGTH
+"""Part of a rail's length that lies between points at least."""
 
 
 @dataclass(frozen=True, eq=False)
 class RailPoints:
-    """k points on rails; any two of a rail are at least twice its reach apart, and that far from its ends."""
+    """k points on rails; any two of a rail are `APART` apart at least, and that far from its ends."""
 
     rail: IntArray
     """(k,)"""
@@ -32,24 +36,20 @@ class RailPoints:
         return np.asarray(a + self.fraction[:, None] * (b - a))
 
 
-def add_points(
-    points: RailPoints, rail: IntArray, fraction: FloatArray, skeleton: Skeleton
-) -> tuple[RailPoints, IntArray]:
+def add_points(points: RailPoints, rail: IntArray, fraction: FloatArray) -> tuple[RailPoints, IntArray]:
     """`points` with those at `fraction` (j,) of `rail` (j,) behind them, and which point each became (j,).
 
-    The new ones are at least twice the reach from both ends. What is nearer than that to another point
+    The new ones are `APART` from both ends at least. What is nearer than that to another point
     becomes that point; those that were there before stay where they are, all of them.
     """
     known = len(points.rail)
     rails = np.concatenate([points.rail, rail])
     fractions = np.concatenate([points.fraction, fraction])
     order = np.lexsort((fractions, rails))
-    a, b = skeleton.position[skeleton.node[rails]], skeleton.position[skeleton.end[rails]]
-    apart = 2.0 * skeleton.reach[rails] / np.linalg.norm(b - a, axis=1)
     point = np.full(len(rails), -1, dtype=np.int32)
     point[:known] = np.arange(known, dtype=np.int32)
     source = np.empty(len(rail), dtype=np.int32)
-    added = _accept(order, known, rails, fractions, apart, point, source)
+    added = _accept(order, known, rails, fractions, point, source)
     kept = np.concatenate([np.arange(known, dtype=np.int32), source[:added]])
     return RailPoints(rails[kept], fractions[kept]), point[known:]
 
@@ -60,7 +60,6 @@ def _accept(
     known: int,
     rail: IntArray,
     fraction: FloatArray,
-    apart: FloatArray,
     point: IntArray,
     source: IntArray,
 ) -> int:
@@ -74,13 +73,11 @@ def _accept(
             after = place + 1
             while after < len(order) and rail[order[after]] == rail[i] and order[after] >= known:
                 after += 1
-            near_before = (
-                before >= 0 and rail[before] == rail[i] and fraction[i] - fraction[before] < apart[i]
-            )
+            near_before = before >= 0 and rail[before] == rail[i] and fraction[i] - fraction[before] < APART
             near_after = (
                 after < len(order)
                 and rail[order[after]] == rail[i]
-                and fraction[order[after]] - fraction[i] < apart[i]
+                and fraction[order[after]] - fraction[i] < APART
             )
             if near_before:
                 point[i] = point[before]

@@ -28,8 +28,6 @@ class Rings:
     """(l,) where it ends there"""
     position: Points
     """(b + k, 3) metres, by stop"""
-    radius: FloatArray
-    """(b + k,) metres, by stop"""
 
 
 def trace_rings(skeleton: Skeleton, points: RailPoints) -> Rings:
@@ -54,7 +52,6 @@ def trace_rings(skeleton: Skeleton, points: RailPoints) -> Rings:
         low=low,
         high=high,
         position=np.concatenate([skeleton.position, points.position(skeleton)]),
-        radius=np.concatenate([skeleton.radius, skeleton.reach[points.rail]]),
     )
 
 

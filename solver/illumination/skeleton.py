@@ -28,8 +28,10 @@ from solver.types import BoolArray, Corners, FloatArray, IntArray, Points
 
 MINIMUM_LENGTH: Final = 1e-3
 """A piece of a discontinuity shorter than twice this times the width of its cell (area over diameter) is not
-meshed: what is as near to a vertex is in it ([H appendix A], 6). On an edge of cells, also relative to its
-length."""
+meshed: what is as near to a vertex is in it ([H appendix A], 6). Likewise on a rail, of its length."""
+
+_NEEDLE: Final = 8.0
+"""Cells are seen as they are up to this ratio of diameter to width; others are seen widened to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Skeleton:
     patch: IntArray
     """(b,) patch of each node: patches share none"""
     radius: FloatArray
-    """(b,) what comes nearer than this, in metres, runs through the node"""
+    """(b,) a constraint edge that comes nearer than this, in metres, runs through the node"""
     start: IntArray
     """(n + 1,) where each cell's pieces begin, at its corner 0"""
     node: IntArray
@@ -57,13 +59,15 @@ class Skeleton:
     forward: BoolArray
     """(m,) whether a piece runs as its rail does"""
     reach: FloatArray
-    """(m,) what comes nearer than this to the piece, in metres, is on it; the same along a rail"""
+    """(m,) an end that comes nearer than this to the piece, in metres, is on it; the same along a rail"""
     center: Points
     """(n, 3) mean of the corners of each cell"""
     diameter: FloatArray
     """(n,) length of the longest side or diagonal of each cell, metres"""
+    axes: FloatArray
+    """(n, 2, 3) metres: a frame for each cell, in which its diameter is about 1 and it is no needle"""
     tolerance: FloatArray
-    """(n,) what comes nearer than this within a cell, in metres, is the same"""
+    """(n,) what comes nearer than this within a cell, in its frame, is the same"""
 
     @property
     def cell_count(self) -> int:
@@ -103,8 +107,10 @@ def build_skeleton(cells: Cells, surfaces: Surfaces) -> Skeleton:
     rail = owner.copy()
     _join_seams(borders, side_start, rail, forward)
 
-    center, diameter, width = np.empty((n, 3)), np.empty(n), np.empty(n)
-    _measure(cells.corners, cells.corner_count, center, diameter, width)
+    center, along, diameter, width = np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.empty(n)
+    _measure(cells.corners, cells.corner_count, center, along, diameter, width)
+    breadth = np.minimum(diameter, _NEEDLE * width)
+    across = np.cross(surfaces.normal[cells.patch], along) * (breadth / diameter)[:, None]
     position = np.concatenate([topology.position, borders.position[borders.taken]])
     reach, radius = np.full(m, np.inf), np.full(v + s, np.inf)
     _find_reach(start, node, end, rail, position, MINIMUM_LENGTH * width, reach, radius)
@@ -122,7 +128,8 @@ def build_skeleton(cells: Cells, surfaces: Surfaces) -> Skeleton:
         reach=reach,
         center=center,
         diameter=diameter,
-        tolerance=MINIMUM_LENGTH * width,
+        axes=np.stack([along, across], axis=1),
+        tolerance=MINIMUM_LENGTH * width / breadth,
     )
 
 
@@ -180,23 +187,31 @@ def _list_pieces(
 
 @kernel
 def _measure(
-    corners: Corners, count: IntArray, center: Points, diameter: FloatArray, width: FloatArray
+    corners: Corners,
+    count: IntArray,
+    center: Points,
+    along: Points,
+    diameter: FloatArray,
+    width: FloatArray,
 ) -> None:
-    """Mean corner, greatest distance between corners, and area over that, of each cell."""
+    """Mean corner, longest side or diagonal, its length, and area over that, of each cell."""
     for cell in range(len(count)):
         n = count[cell]
-        greatest = 0.0
+        diameter[cell] = 0.0
         for i in range(n):
             for j in range(i):
-                square = 0.0
+                length = 0.0
                 for axis in range(3):
-                    square += (corners[cell, i, axis] - corners[cell, j, axis]) ** 2
-                greatest = max(greatest, square)
+                    length += (corners[cell, i, axis] - corners[cell, j, axis]) ** 2
+                length = np.sqrt(length)
+                if length > diameter[cell]:
+                    diameter[cell] = length
+                    for axis in range(3):
+                        along[cell, axis] = corners[cell, i, axis] - corners[cell, j, axis]
         for axis in range(3):
             center[cell, axis] = 0.0
             for i in range(n):
                 center[cell, axis] += corners[cell, i, axis] / n
-        diameter[cell] = np.sqrt(greatest)
         width[cell] = polygon_area(corners[cell]) / diameter[cell]
 
 

@@ -1,8 +1,8 @@
 """Triangles that must tile their cells: those that only rounding keeps from being flat, and the check.
 
 Of vertices on one line, rounding decides on which side of it each lies. A triangle of three such vertices
-is right side up where it was made and may not be so in space. No line comes as near to a vertex as that:
-its longest edge is none that must be, and gives way to the other diagonal.
+is right side up where it was made and may not be so in space. Its longest edge gives way to the other
+diagonal, unless a line runs there, which no line does that near to a vertex.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def settle_tiling(
     return int(
         _settle(
             cells, lines.cell_patch[cells], first, last, triangles, lines.ring_start, lines.ring,
-            lines.node_start, lines.position, normals,
+            lines.inner_start, lines.inner, lines.edge_start, lines.edge, lines.node_start, lines.position,
+            normals,
         )
     )  # fmt: skip
 
@@ -49,6 +50,10 @@ def _settle(
     triangles: IntArray,
     ring_start: IntArray,
     ring: IntArray,
+    inner_start: IntArray,
+    inner: IntArray,
+    edge_start: IntArray,
+    edge: IntArray,
     node_start: IntArray,
     position: Points,
     normals: FloatArray,
@@ -64,10 +69,21 @@ def _settle(
                 largest = max(largest, abs(position[base + ring[k], axis]))
             if k > start and k + 1 < ring_start[cells[i] + 1]:
                 whole += _area(position, base + ring[start], base + ring[k], base + ring[k + 1], normal)
+        # What the lines of the cell run between.
+        count = ring_start[cells[i] + 1] - start
+        fixed = np.empty((edge_start[cells[i] + 1] - edge_start[cells[i]], 2), np.int32)
+        for e in range(len(fixed)):
+            for k in range(2):
+                place = edge[edge_start[cells[i]] + e, k]
+                fixed[e, k] = (
+                    ring[start + place] if place < count else inner[inner_start[cells[i]] + place - count]
+                )
         # Each turn makes the lesser height of two triangles greater: they come to an end.
         t = first[i]
         while t < last[i]:
-            turned = _turn(triangles, t, first[i], last[i], base, position, normal, _ROUNDING * largest)
+            turned = _turn(
+                triangles, fixed, t, first[i], last[i], base, position, normal, _ROUNDING * largest
+            )
             t = first[i] if turned else t + 1
         total = 0.0
         for t in range(first[i], last[i]):
@@ -85,6 +101,7 @@ def _settle(
 @kernel
 def _turn(
     triangles: IntArray,
+    fixed: IntArray,
     t: int,
     first: int,
     last: int,
@@ -107,6 +124,9 @@ def _turn(
     height = _height(position, base + a, base + b, base + c, normal)
     if height > flat:
         return False
+    for e in range(len(fixed)):
+        if (fixed[e, 0] == a and fixed[e, 1] == b) or (fixed[e, 0] == b and fixed[e, 1] == a):
+            return False
     for u in range(first, last):
         for i in range(3):
             if triangles[u, i] == b and triangles[u, (i + 1) % 3] == a:

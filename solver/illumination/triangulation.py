@@ -30,7 +30,6 @@ from solver.illumination.delaunay import triangulate_cells
 from solver.illumination.linework import Linework, draw_lines
 from solver.illumination.patch_triangles import PatchTriangles, connect_triangles, keep_triangles
 from solver.illumination.skeleton import build_skeleton
-from solver.transport.elements import plane_axes
 from solver.types import BoolArray, IntArray, Points
 
 
@@ -95,13 +94,12 @@ def triangulate(
     order = np.argsort(cells.patch, kind="stable").astype(np.int32)
     cells = Cells(cells.corners[order], cells.corner_count[order], cells.patch[order], cells.leaf[order])
     edges = edges.take(np.argsort(~edges.jump, kind="stable").astype(np.int32))
-    axes = plane_axes(surfaces.normal)
     skeleton = build_skeleton(cells, surfaces)
     chords, points = find_chords(cells, surfaces, edges, skeleton)
-    arrangement, rings = arrange(chords, points, cells, edges, skeleton, axes)
+    arrangement, rings = arrange(chords, points, edges, skeleton)
     lines = draw_lines(cells, edges, skeleton, rings, arrangement, p, middles)
     kept = np.zeros(p, dtype=np.bool_) if previous is None else lines.same_patches(previous.linework)
-    made = connect_triangles(triangulate_cells(lines, ~kept, surfaces.normal, axes), lines)
+    made = connect_triangles(triangulate_cells(lines, ~kept, surfaces.normal, skeleton), lines)
     if previous is not None:
         made = keep_triangles(made, previous.parts, kept)
     patch = made.patch

@@ -268,6 +268,13 @@ def test_nearly_parallel_edges_cross(angle: float) -> None:
     made_of(shape("square"), even(1), lines)
 
 
+def test_edges_that_cross_beside_an_edge_of_cells_cross_on_it() -> None:
+    """Both graze the side of their cell and cross within its reach: the neighbour gets the vertex too."""
+    made = made_of(shape("square"), even(1), [(0, (0.0, 0.502), (0.4, 0.5)), (0, (0.5, 0.502), (0.3, 0.5))])
+    on_side = made.position[made.position[:, 1] == 0.5, 0]
+    np.testing.assert_allclose(np.sort(on_side), [0.0, 0.3, 1 / 3, 0.4, 0.5, 1.0], atol=1e-9)
+
+
 def test_hundreds_of_collinear_edges_are_one_line() -> None:
     random = np.random.default_rng(1)
     start, end = random.random((2, 300))
@@ -408,6 +415,7 @@ def test_a_scene_without_cells_has_no_triangles() -> None:
     made = triangulate(nothing, surfaces, ConstraintEdges.none())
     assert made.triangles.shape == (0, 3) and made.position.shape == (0, 3)
     assert triangulate(nothing, surfaces, ConstraintEdges.none(), made).rebuilt == 0
+    assert len(triangulate(nothing, surfaces_of(), ConstraintEdges.none()).triangles) == 0
 
 
 @pytest.mark.parametrize("name", ["patch", "ends"])

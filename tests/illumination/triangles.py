@@ -17,7 +17,7 @@ Spot = tuple[float, float]
 Segment = tuple[int, Spot, Spot]
 """Patch, and both ends."""
 
-STRAYING = 4.0
+STRAYING = 6.0
 """Discontinuities move by less than this times the minimum length of their patch's widest cell."""
 
 

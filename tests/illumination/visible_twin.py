@@ -19,6 +19,9 @@ ON_PLANE: Final = 1e-10
 """What is as close to a plane as this times the size of the view is on it: a point on that of a blocker, a
 blocker on that of the source."""
 
+_GRID: Final = 1e-13
+"""Coordinates are rounded to multiples of this times the size: shapely is then robust without exception."""
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -75,7 +78,9 @@ def visible_region(view: View) -> Region:
     """The part of the source above the horizon that no blocker hides."""
     whole = source_region(view)
     hidden = [shadow for blocker in view.blockers if (shadow := _shadow(view, blocker, whole)) is not None]
-    return Region(whole.shape.difference(shapely.union_all(hidden)), whole.origin, whole.axes)
+    grid = _GRID * view.size
+    left = shapely.difference(whole.shape, shapely.union_all(hidden, grid_size=grid), grid_size=grid)
+    return Region(left, whole.origin, whole.axes)
 
 
 def source_region(view: View) -> Region:

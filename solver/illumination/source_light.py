@@ -1,0 +1,349 @@
+"""The light that a point receives from sources, element by element ([H 6.2]).
+
+A source is entered as far as its radiosity residual, times the point's form factor, is felt. What is left
+counts with the radiosity where the light that arrives from it comes from on average. Elements are taken in
+blocks, whose form factors are found in lanes; only those that the horizon cuts, or that blockers may hide,
+are looked at alone. An element's blockers are those of its parent that are not clear of it. Visible parts are
+exact, but for what brings no more than an allowance altogether: it counts with the visibility of its link.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from solver.illumination.cuts import ABOVE, PER_BLOCKER, ROOM, WHOLE, Buffers, clip_above, make_buffers
+from solver.illumination.factor_lanes import (
+    BLOCK,
+    FACTOR,
+    HIGHEST,
+    INWARDS,
+    LANES,
+    LOWEST,
+    WEIGHT,
+    fill_lane,
+    find_factors,
+    polygon_of_lane,
+)
+from solver.illumination.pyramids import HIDDEN, PYRAMID, Sight, cull, raise_pyramid
+from solver.illumination.visible_parts import clip_by_pyramids, factor_of
+from solver.kernels import kernel
+from solver.types import Corners, FloatArray, IntArray, Points
+
+_DEPTH: Final = 512
+"""Elements waiting to be looked at; where there are more, they are not entered."""
+
+_PARTS: Final = 64
+"""Visible pieces whose place is looked at; those that are more count as much as these do."""
+
+_LISTS: Final = 4096
+"""Room for the blockers of elements that wait, beside those of the sources; where it is used up, elements
+have all blockers of their parents."""
+
+_NEAR: Final = 1.0
+"""Within this times its diagonal the points that stand for an element tell too little of a gradient on it."""
+
+_MISSED: Final = 0.2
+"""Part of the linear variation of an element's radiosity that they then miss."""
+
+
+class Elements(NamedTuple):
+    """What is asked of the n elements of a tree over p patches."""
+
+    child: IntArray
+    child_count: IntArray
+    corners: Corners
+    corner_count: IntArray
+    patch: IntArray
+    centroid: Points
+    axes: FloatArray
+    """(p, 2, 3)"""
+    normals: FloatArray
+    """(p, 3)"""
+
+
+class Light(NamedTuple):
+    """Radiosity on n elements, as in `light.Sources`."""
+
+    functions: FloatArray
+    luminance: FloatArray
+    spread: FloatArray
+    slope: FloatArray
+    extent: FloatArray
+
+
+class Desk(NamedTuple):
+    """Elements that wait to be looked at, and what the work on them needs."""
+
+    element: IntArray
+    """(_DEPTH,)"""
+    first: IntArray
+    """(_DEPTH,) where their blockers begin in `pool`"""
+    blockers: IntArray
+    """(_DEPTH,) how many there are"""
+    visibility: FloatArray
+    """(_DEPTH,) of their links"""
+    pool: IntArray
+    """patches that may hide something, lists one behind the other"""
+    lane: IntArray
+    """(LANES, 3) element, first and blockers of each lane"""
+    lane_visibility: FloatArray
+    """(LANES,)"""
+    block: FloatArray
+    """(BLOCK,)"""
+    pyramid: FloatArray
+    """(1, PYRAMID) an element's own, as a source"""
+    place: FloatArray
+    """(4,) weight, and place times weight, whence its light comes"""
+    parts: FloatArray
+    """(_PARTS, ROOM, 3) its visible pieces"""
+    part_count: IntArray
+    """(_PARTS,)"""
+    buffers: Buffers
+
+
+@kernel
+def make_desk(most_blockers: int) -> Desk:
+    """For elements with so many blockers at most."""
+    return Desk(
+        np.empty(_DEPTH, dtype=np.int32),
+        np.empty(_DEPTH, dtype=np.int32),
+        np.empty(_DEPTH, dtype=np.int32),
+        np.empty(_DEPTH),
+        np.empty((LANES + 1) * most_blockers + _LISTS, dtype=np.int32),
+        np.empty((LANES, 3), dtype=np.int32),
+        np.empty(LANES),
+        np.zeros(BLOCK),
+        np.empty((1, PYRAMID)),
+        np.empty(4),
+        np.empty((_PARTS, ROOM, 3)),
+        np.empty(_PARTS, dtype=np.int32),
+        make_buffers(most_blockers),
+    )
+
+
+@kernel
+def height_before(x: FloatArray, corners: Corners, polygon: int, normals: FloatArray, plane: int) -> float:
+    """Metres by which a point is before the front of a row of corners (n, 4, 3)."""
+    height = 0.0
+    for axis in range(3):
+        height += normals[plane, axis] * (x[axis] - corners[polygon, 0, axis])
+    return height
+
+
+@kernel
+def relative_polygon(
+    x: FloatArray, corners: Corners, polygon: int, count: int, polygons: FloatArray, slot: int
+) -> None:
+    """Write a row of corners (n, 4, 3), relative to the point, to a row of polygons (s, >= 4, 3)."""
+    for corner in range(count):
+        for axis in range(3):
+            polygons[slot, corner, axis] = corners[polygon, corner, axis] - x[axis]
+
+
+@kernel
+def lay(desk: Desk, at: int, element: int, first: int, blockers: int, visibility: float) -> None:
+    """Let an element wait at a place of the desk."""
+    desk.element[at] = element
+    desk.first[at] = first
+    desk.blockers[at] = blockers
+    desk.visibility[at] = visibility
+
+
+@kernel
+def _weigh(
+    normal: FloatArray,
+    source_normals: FloatArray,
+    plane: int,
+    polygons: FloatArray,
+    slot: int,
+    count: int,
+    sums: FloatArray,
+) -> None:
+    """Add to sums (4,) the weight, and the weighted place, of places on a row of polygons (s, n, 3).
+
+    It is convex and relative to the point. They lie between its middle and its corners, and weigh as much as
+    the light from there would count.
+    """
+    cx = cy = cz = 0.0
+    for k in range(count):
+        cx += polygons[slot, k, 0] / count
+        cy += polygons[slot, k, 1] / count
+        cz += polygons[slot, k, 2] / count
+    ax = ay = az = 0.0
+    for k in range(1, count - 1):
+        ux = polygons[slot, k, 0] - polygons[slot, 0, 0]
+        uy = polygons[slot, k, 1] - polygons[slot, 0, 1]
+        uz = polygons[slot, k, 2] - polygons[slot, 0, 2]
+        vx = polygons[slot, k + 1, 0] - polygons[slot, 0, 0]
+        vy = polygons[slot, k + 1, 1] - polygons[slot, 0, 1]
+        vz = polygons[slot, k + 1, 2] - polygons[slot, 0, 2]
+        ax += uy * vz - uz * vy
+        ay += uz * vx - ux * vz
+        az += ux * vy - uy * vx
+    area = math.sqrt(ax * ax + ay * ay + az * az) / count
+    sx = source_normals[plane, 0]
+    sy = source_normals[plane, 1]
+    sz = source_normals[plane, 2]
+    for k in range(count):
+        px = cx + INWARDS * (polygons[slot, k, 0] - cx)
+        py = cy + INWARDS * (polygons[slot, k, 1] - cy)
+        pz = cz + INWARDS * (polygons[slot, k, 2] - cz)
+        here = normal[0] * px + normal[1] * py + normal[2] * pz
+        there = -(sx * px + sy * py + sz * pz)
+        square = px * px + py * py + pz * pz
+        if here > 0.0 and there > 0.0:
+            weight = area * here * there / (square * square)
+            sums[0] += weight
+            sums[1] += weight * px
+            sums[2] += weight * py
+            sums[3] += weight * pz
+
+
+@kernel
+def _add(
+    x: FloatArray,
+    e: int,
+    p: int,
+    factor: float,
+    place: FloatArray,
+    centroid: Points,
+    axes: FloatArray,
+    functions: FloatArray,
+    out: FloatArray,
+    row: int,
+) -> None:
+    """Add to a row of out the light of element e of patch p, by form factor and the place whence it comes."""
+    u = 0.0
+    v = 0.0
+    if place[0] > 0.0:
+        for axis in range(3):
+            from_centroid = place[1 + axis] / place[0] + x[axis] - centroid[e, axis]
+            u += axes[p, 0, axis] * from_centroid
+            v += axes[p, 1, axis] * from_centroid
+    for c in range(out.shape[1]):
+        radiosity = functions[e, 0, c] + u * functions[e, 1, c] + v * functions[e, 2, c]
+        out[row, c] += factor * max(0.0, radiosity)
+
+
+@kernel
+def add_waiting(
+    x: FloatArray,
+    point: int,
+    normal: FloatArray,
+    desk: Desk,
+    top: int,
+    used: int,
+    limit: float,
+    allowance: float,
+    elements: Elements,
+    light: Light,
+    sight: Sight,
+    tolerance: float,
+    out: FloatArray,
+) -> float:
+    """Add to row `point` of out (n, channels) the irradiance at x (3,) from `top` elements on the desk.
+
+    The point is before their fronts; their blockers take up `used` places of the pool. Elements are entered
+    whose residual brings more than `limit`; `allowance` is what may still count with the visibility of links:
+    its rest is returned.
+    """
+    # Fields are taken out once: each time counts as a reference.
+    child = elements.child
+    child_count = elements.child_count
+    corners = elements.corners
+    corner_count = elements.corner_count
+    patch = elements.patch
+    centroid = elements.centroid
+    axes = elements.axes
+    normals = elements.normals
+    luminance = light.luminance
+    spread = light.spread
+    slope = light.slope
+    extent = light.extent
+    functions = light.functions
+    lane = desk.lane
+    lane_visibility = desk.lane_visibility
+    block = desk.block
+    pool = desk.pool
+    pyramid = desk.pyramid
+    place = desk.place
+    parts = desk.parts
+    part_count = desk.part_count
+    buffers = desk.buffers
+    work = buffers.work
+    pyramids = sight.pyramids
+    sight_sides = sight.sides
+    spare = len(pool) - len(buffers.corners) // PER_BLOCKER
+    while top > 0:
+        lanes = min(top, LANES)
+        for k in range(lanes):
+            top -= 1
+            e = desk.element[top]
+            lane[k, 0] = e
+            lane[k, 1] = desk.first[top]
+            lane[k, 2] = desk.blockers[top]
+            lane_visibility[k] = desk.visibility[top]
+            fill_lane(block, k, x, corners, e, corner_count[e], normals, patch[e])
+        find_factors(block, normal[0], normal[1], normal[2])
+        for k in range(lanes):
+            e = lane[k, 0]
+            p = patch[e]
+            first = lane[k, 1]
+            blockers = lane[k, 2]
+            sides = corner_count[e]
+            count = sides
+            # The horizon [H 6.2.1].
+            is_cut = block[LOWEST + k] < 0.0
+            factor = block[FACTOR + k] if block[HIGHEST + k] > 0.0 else 0.0
+            if is_cut and block[HIGHEST + k] > 0.0:
+                polygon_of_lane(block, k, sides, work, WHOLE)
+                count = clip_above(buffers, sides, normal)
+                factor = factor_of(work, ABOVE, count, normal)
+            square = 0.0
+            for axis in range(3):
+                square += (x[axis] - centroid[e, axis]) ** 2
+            variation = spread[e] + (_MISSED * slope[e] if square < _NEAR * extent[e] else 0.0)
+            enters = child[e] >= 0 and factor * variation > limit and top + child_count[e] <= _DEPTH
+            # Those who may hide some of it.
+            brings = factor * luminance[e]
+            if blockers > 0 and not enters and brings <= allowance:
+                allowance -= brings
+                factor *= lane_visibility[k]
+                blockers = 0
+            if blockers > 0 and factor > 0.0:
+                if not is_cut:
+                    polygon_of_lane(block, k, sides, work, ABOVE)
+                raise_pyramid(x, corners, e, sides, normals, p, 0.0, pyramid, 0)
+                kept = cull(
+                    x, point, normal, work, ABOVE, count, pyramid, 0, sides, pool, first, first + blockers,
+                    sight, tolerance, pool, used,
+                )  # fmt: skip
+                if kept == HIDDEN:
+                    factor = 0.0
+                elif not enters or used + kept <= spare:
+                    first = used
+                    blockers = kept
+                    used += kept if enters else 0
+            if factor > 0.0 and enters:
+                for c in range(child[e], child[e] + child_count[e]):
+                    if luminance[c] > 0.0:
+                        lay(desk, top, c, first, blockers, lane_visibility[k])
+                        top += 1
+            elif factor > 0.0:
+                # What is seen of it.
+                for row in range(4):
+                    place[row] = 0.0 if blockers > 0 or is_cut else block[WEIGHT + row * LANES + k]
+                if blockers > 0:
+                    factor, found = clip_by_pyramids(
+                        normal, count, pool, first, first + blockers, pyramids, sight_sides, tolerance,
+                        buffers, parts, part_count,
+                    )  # fmt: skip
+                    for part in range(min(found, _PARTS)):
+                        _weigh(normal, normals, p, parts, part, part_count[part], place)
+                elif is_cut:
+                    _weigh(normal, normals, p, work, ABOVE, count, place)
+                _add(x, e, p, factor, place, centroid, axes, functions, out, point)
+    return allowance
