@@ -1,6 +1,6 @@
-"""What picks and overlays are answered with.
+"""What overlays are answered with.
 
-Overlays are tables: each list holds one value an item, and all are of one length, `count`. Lengths are in
+They are tables: each list holds one value an item, and all are of one length, `count`. Lengths are in
 metres, areas in m2, irradiance and radiosity in W/m2 as R, G, B; what is unknown, or without bound, is null.
 Corners of triangles among quadrilaterals come with their last one twice, and `corner_count` 3.
 """
@@ -11,68 +11,13 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from solver.engine.picking import PickResult
+from service.schemas import Triple
 
-Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Pair: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2)]
 _Ends: TypeAlias = Annotated[list[Triple], Field(min_length=2, max_length=2)]
 _Triangle: TypeAlias = Annotated[list[Triple], Field(min_length=3, max_length=3)]
 _Quadrilateral: TypeAlias = Annotated[list[Triple], Field(min_length=4, max_length=4)]
 _Visibility: TypeAlias = Literal["full", "partial", "none"]
-
-
-class PickAnswer(BaseModel):
-    """What a pixel shows; all but `revision` and `hit` are null where it shows nothing."""
-
-    revision: int
-    hit: bool = Field(description="Whether it shows anything.")
-    object: str | None = None
-    face: int | None = Field(default=None, description="Index of the face in its object's mesh.")
-    patch: int | None = Field(
-        default=None, description="The convex piece of the face, as overlays number it."
-    )
-    element: int | None = Field(default=None, description="The leaf of the element hierarchy.")
-    leaf: int | None = Field(default=None, description="The same as a frame's layer `element` numbers it.")
-    triangle: int | None = Field(
-        default=None,
-        description="Of the triangulation, as a frame's layer `triangle`; null before there is one.",
-    )
-    barycentric: Triple | None = Field(default=None, description="Weights of that triangle's corners.")
-    point: Triple | None = Field(default=None, description="Metres.")
-    normal: Triple | None = Field(default=None, description="Of the face's front, of length 1.")
-    front: bool | None = Field(default=None, description="Whether that is what is seen; a back is black.")
-    irradiance: Triple | None = Field(
-        default=None, description="W/m2, as a frame shows it: by the interpolant where there is one."
-    )
-    illuminance: float | None = Field(default=None, description="lux")
-    radiosity: Triple | None = Field(default=None, description="W/m2, emission included.")
-    depth: float | None = Field(default=None, description="Metres along the viewing direction.")
-
-    @classmethod
-    def of(cls, result: PickResult) -> PickAnswer:
-        """The wire's form of a pick."""
-        found = result.point
-        if found is None:
-            return cls(revision=result.revision, hit=False)
-        seen = found.seen
-        return cls(
-            revision=result.revision,
-            hit=True,
-            object=seen.object_id,
-            face=seen.face,
-            patch=seen.patch,
-            element=found.element,
-            leaf=seen.leaf,
-            triangle=seen.triangle if found.has_interpolant else None,
-            barycentric=seen.barycentric.tolist() if found.has_interpolant else None,
-            point=seen.position.tolist(),
-            normal=(seen.normal + 0.0).tolist(),
-            front=found.front,
-            irradiance=found.irradiance.tolist(),
-            illuminance=found.illuminance,
-            radiosity=found.radiosity.tolist(),
-            depth=found.depth,
-        )
 
 
 class OverlayLink(BaseModel):

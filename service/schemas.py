@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,7 +11,11 @@ from solver.document.edits import Edit
 from solver.document.fields import Closed, Direction, Point
 from solver.document.models import SceneDocument
 from solver.document.settings import SettingsDocument
+from solver.engine.picking import PickResult
 from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
+
+Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
+"""x, y, z or R, G, B that are told."""
 
 
 class SessionRequest(Closed):
@@ -190,6 +194,60 @@ class ProbeAnswer(BaseModel):
             irradiance=result.irradiance.tolist(),
             illuminance=result.illuminance.tolist(),
             error_estimate=result.error_estimate.tolist(),
+        )
+
+
+class PickAnswer(BaseModel):
+    """What a pixel shows; all but `revision` and `hit` are null where it shows nothing."""
+
+    revision: int
+    hit: bool = Field(description="Whether it shows anything.")
+    object: str | None = None
+    face: int | None = Field(default=None, description="Index of the face in its object's mesh.")
+    patch: int | None = Field(
+        default=None, description="The convex piece of the face, as overlays number it."
+    )
+    element: int | None = Field(default=None, description="The leaf of the element hierarchy.")
+    leaf: int | None = Field(default=None, description="The same as a frame's layer `element` numbers it.")
+    triangle: int | None = Field(
+        default=None,
+        description="Of the triangulation, as a frame's layer `triangle`; null before there is one.",
+    )
+    barycentric: Triple | None = Field(default=None, description="Weights of that triangle's corners.")
+    point: Triple | None = Field(default=None, description="Metres.")
+    normal: Triple | None = Field(default=None, description="Of the face's front, of length 1.")
+    front: bool | None = Field(default=None, description="Whether that is what is seen; a back is black.")
+    irradiance: Triple | None = Field(
+        default=None, description="W/m2, as a frame shows it: by the interpolant where there is one."
+    )
+    illuminance: float | None = Field(default=None, description="lux")
+    radiosity: Triple | None = Field(default=None, description="W/m2, emission included.")
+    depth: float | None = Field(default=None, description="Metres along the viewing direction.")
+
+    @classmethod
+    def of(cls, result: PickResult) -> PickAnswer:
+        """The wire's form of a pick."""
+        found = result.point
+        if found is None:
+            return cls(revision=result.revision, hit=False)
+        seen = found.seen
+        return cls(
+            revision=result.revision,
+            hit=True,
+            object=seen.object_id,
+            face=seen.face,
+            patch=seen.patch,
+            element=found.element,
+            leaf=seen.leaf,
+            triangle=seen.triangle if found.has_interpolant else None,
+            barycentric=seen.barycentric.tolist() if found.has_interpolant else None,
+            point=seen.position.tolist(),
+            normal=(seen.normal + 0.0).tolist(),
+            front=found.front,
+            irradiance=found.irradiance.tolist(),
+            illuminance=found.illuminance,
+            radiosity=found.radiosity.tolist(),
+            depth=found.depth,
         )
 
 

@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query
 from service.context import UsedSession
 from service.hosting.messages import GetPick
 from service.overlay_query import PickQuery
-from service.overlay_schemas import PickAnswer
 from service.problems import responses
+from service.schemas import PickAnswer
 
 router = APIRouter(prefix="/v1", tags=["measurements"])
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.overlay_schemas import PickAnswer
+from service.schemas import PickAnswer
 from solver.types import AnyArray
 from tests.service.problem import fields_at_fault, problem_of
 
