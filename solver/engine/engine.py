@@ -146,9 +146,14 @@ class Engine:
             unshot_fraction=solver.unshot_fraction,
             statistics=solver.statistics(),
             fine=FineStatistics() if self._fine is None else self._fine.statistics(),
-            warnings=solution.warnings,
+            warnings=self._warnings(),
             settings=self._settings,
         )
+
+    def _warnings(self) -> tuple[str, ...]:
+        failure = None if self._fine is None else self._fine.failure
+        told = self._solution.warnings
+        return told if failure is None else (*told, failure)
 
     def outlook(self, request: FrameRequest) -> Outlook:
         """What a frame drawn now would be.
@@ -260,7 +265,7 @@ class Engine:
             return GatherView(coarse, None, self._solution.error_estimate)
         point = fine.prepare()
         if point is None:
-            return GatherView(coarse, None, fine.gather_error)
+            return GatherView(coarse, None, fine.gather_error, fine.failure is not None)
         if self._gathers is None:
             self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
         return GatherView(coarse, self._gathers.ask(coarse.camera, coarse.samples), fine.gather_error)

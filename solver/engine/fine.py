@@ -18,6 +18,7 @@ from solver.engine.cameras import camera_key
 from solver.engine.drawing import Drawing
 from solver.engine.solution import Solution
 from solver.engine.status import FineStatistics
+from solver.errors import SolverError
 from solver.geometry.scene import Camera
 from solver.illumination.cells import Cells
 from solver.illumination.correction import corrected
@@ -35,6 +36,9 @@ from solver.types import FloatArray, IntArray
 KEPT: Final = 4
 """Cameras kept in mind at once; a new one takes the place of the one asked for longest ago."""
 
+_FAILURES: Final = (SolverError, ArithmeticError, LookupError, MemoryError, RuntimeError, ValueError)
+"""What libraries raise over geometry that they cannot bear; the solution itself is none the worse."""
+
 _GATHER_ERROR: Final = 0.6
 """Error of point irradiance from a corrected solution, relative to the estimated error of the solution."""
 
@@ -49,6 +53,8 @@ class FineLight:
         """Nothing is built yet. Raises ValueError for a sampled solution."""
         self.version = 0
         """Counts the changes of what can be drawn."""
+        self.failure: str | None = None
+        """What to tell a user where the work met an error that it cannot go on from."""
         self._solution = solution
         if not isinstance(solution.solver, RadiositySolver):
             raise ValueError("interpolants are made over links, which a sampled solution does not have")
@@ -148,13 +154,21 @@ class FineLight:
         """Work for about `budget` seconds; False if nothing needed any."""
         start = time.perf_counter()
         needed = self._has_work()
-        while self._has_work():
-            next(self._work)
-            if time.perf_counter() - start >= budget:
-                break
+        try:
+            while self._has_work():
+                next(self._work)
+                if time.perf_counter() - start >= budget:
+                    break
+        except _FAILURES as failure:
+            reason = "out of memory" if isinstance(failure, MemoryError) else str(failure)
+            self.failure = f"Interpolants cannot be built for this scene; frames show its elements: {reason}"
+            self._interpolants = None
+            self.version += 1
         return needed
 
     def _has_work(self) -> bool:
+        if self.failure is not None:
+            return False
         preparing = self._is_preparing and self._point is None
         return preparing or (bool(self._cameras) and not self._is_resting)
 

@@ -157,7 +157,7 @@ class InterpolantView:
         """Whether there is work to do."""
         if self.fine is None:
             return self.coarse.improving
-        return not self.fine.is_complete(self.coarse.camera)
+        return self.fine.failure is None and not self.fine.is_complete(self.coarse.camera)
 
     @property
     def version(self) -> str:
@@ -182,6 +182,8 @@ class GatherView:
     frame: GatherFrame | None
     """None while the solution is worked on"""
     error: float
+    failed: bool = False
+    """Whether there will never be one"""
 
     @property
     def drawable(self) -> bool:
@@ -201,7 +203,7 @@ class GatherView:
     @property
     def improving(self) -> bool:
         """Until it is complete."""
-        return not self.drawable and self.coarse.solution.state is not SessionState.FAILED
+        return not self.drawable and not self.failed and self.coarse.solution.state is not SessionState.FAILED
 
     @property
     def version(self) -> str:

@@ -57,7 +57,7 @@ def find_lines(
     outlines = find_outlines(surfaces)
     yield
     parts = []
-    for start in range(0, surfaces.patch_count, _AT_ONCE):
+    for start in range(0, max(1, surfaces.patch_count), _AT_ONCE):
         receivers = np.arange(start, min(start + _AT_ONCE, surfaces.patch_count), dtype=np.int32)
         parts.append(find_discontinuities(surfaces, hierarchy, sources, receivers, outlines=outlines))
         yield
