@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from solver.kernels import kernel
+from solver.kernels import inline_kernel, kernel
 from solver.types import FloatArray, IntArray
 
 VERTICES: Final = 12
@@ -61,7 +61,7 @@ def make_buffers(most_blockers: int) -> Buffers:
     )
 
 
-@kernel
+@inline_kernel
 def cut(
     work: FloatArray,
     slot: int,
@@ -88,71 +88,81 @@ def cut(
         height = a * work[slot, k, 0] + b * work[slot, k, 1] + c * work[slot, k, 2] - offset
         work[_HEIGHTS, k, 0] = height
         low = height if height < low else low
-        if height > high:
-            high = height
-            first = k
-    up = 0
-    down = 0
+        first = k if height > high else first
+        high = height if height > high else high
     if low >= -margin:
-        for k in range(count):
-            for axis in range(3):
-                work[above, k, axis] = work[slot, k, axis]
-        up = count
+        run = count
     elif high <= margin:
-        for k in range(count):
-            for axis in range(3):
-                stack[below, k, axis] = work[slot, k, axis]
-        down = count
+        run = 0
     else:
-        last = first - 1 if first > 0 else count - 1
-        while work[_HEIGHTS, last, 0] > 0.0:
-            first = last
-            last = first - 1 if first > 0 else count - 1
-        k = first
-        while work[_HEIGHTS, k, 0] > 0.0:
-            for axis in range(3):
-                work[above, up, axis] = work[slot, k, axis]
-            up += 1
-            last = k
-            k = k + 1 if k + 1 < count else 0
-        # Out through the edge from `last` to k.
-        share = work[_HEIGHTS, last, 0] / (work[_HEIGHTS, last, 0] - work[_HEIGHTS, k, 0])
+        # Back to the first of those above, and on to the last.
+        goes_on = True
+        for _ in range(count):
+            before = first - 1 if first > 0 else count - 1
+            goes_on = goes_on and work[_HEIGHTS, before, 0] > 0.0
+            first = before if goes_on else first
+        run = 0
+        goes_on = True
+        for k in range(count):
+            at = first + k if first + k < count else first + k - count
+            goes_on = goes_on and work[_HEIGHTS, at, 0] > 0.0
+            run += 1 if goes_on else 0
+    for k in range(run):
+        at = first + k if first + k < count else first + k - count
         for axis in range(3):
-            value = work[slot, last, axis] + share * (work[slot, k, axis] - work[slot, last, axis])
-            work[above, up, axis] = value
-            stack[below, 0, axis] = value
-        up += 1
-        down = 1 if work[_HEIGHTS, k, 0] < 0.0 else 0
-        while k != first:
-            for axis in range(3):
-                stack[below, down, axis] = work[slot, k, axis]
-            down += 1
-            last = k
-            k = k + 1 if k + 1 < count else 0
-        # In again through the edge from `last` to `first`.
-        share = work[_HEIGHTS, first, 0] / (work[_HEIGHTS, first, 0] - work[_HEIGHTS, last, 0])
+            work[above, k, axis] = work[slot, at, axis]
+    crossings = 1 if 0 < run < count else 0
+    down = 0
+    for _ in range(crossings):
+        last = first + run - 1 if first + run - 1 < count else first + run - 1 - count
+        after = last + 1 if last + 1 < count else 0
+        down += _cross(work, slot, last, after, above, run, stack, below, 0)
+    for k in range(run, count):
+        at = first + k if first + k < count else first + k - count
         for axis in range(3):
-            value = work[slot, first, axis] + share * (work[slot, last, axis] - work[slot, first, axis])
-            work[above, up, axis] = value
-            stack[below, down, axis] = value
-        up += 1
-        down += 1 if work[_HEIGHTS, last, 0] < 0.0 else 0
-    return up, down
+            stack[below, down, axis] = work[slot, at, axis]
+        down += 1
+    for _ in range(crossings):
+        before = first - 1 if first > 0 else count - 1
+        down += _cross(work, slot, first, before, above, run + 1, stack, below, down)
+    return run + 2 * crossings, down
+
+
+@inline_kernel
+def _cross(
+    work: FloatArray,
+    slot: int,
+    high: int,
+    low: int,
+    above: int,
+    up: int,
+    stack: FloatArray,
+    below: int,
+    down: int,
+) -> int:
+    """Put the place where the edge from a corner above to one that is not crosses into both parts.
+
+    Returns the number of corners that the part below gains: none where the lower corner is that place.
+    """
+    share = work[_HEIGHTS, high, 0] / (work[_HEIGHTS, high, 0] - work[_HEIGHTS, low, 0])
+    for axis in range(3):
+        value = work[slot, high, axis] + share * (work[slot, low, axis] - work[slot, high, axis])
+        work[above, up, axis] = value
+        stack[below, down, axis] = value
+    return 1 if work[_HEIGHTS, low, 0] < 0.0 else 0
 
 
 @kernel
-def clip_above(buffers: Buffers, count: int, normal: FloatArray) -> int:
+def clip_above(work: FloatArray, stack: FloatArray, count: int, normal: FloatArray) -> int:
     """Put the part above the horizon of the polygon in slot WHOLE, relative to the point, into slot ABOVE.
 
-    Returns its number of corners.
+    Returns its number of corners; overwrites slot 0 of the stack.
     """
-    up, _ = cut(
-        buffers.work, WHOLE, count, normal[0], normal[1], normal[2], 0.0, 0.0, ABOVE, buffers.stack, 0
-    )
+    up, _ = cut(work, WHOLE, count, normal[0], normal[1], normal[2], 0.0, 0.0, ABOVE, stack, 0)
     return up
 
 
-@kernel
+@inline_kernel
 def halve(stack: FloatArray, corners: IntArray, blocker: IntArray, top: int) -> None:
     """Cut the piece at `top` in two, through corners; the second goes on top."""
     n = corners[top]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.illumination.cuts import ABOVE, WHOLE, clip_above
+from solver.illumination.desk import Desk, Elements, Light, height_before, lay, make_desk
 from solver.illumination.factor_lanes import (
     FACTOR,
     HIGHEST,
@@ -14,16 +15,8 @@ from solver.illumination.factor_lanes import (
     find_factors,
     polygon_of_lane,
 )
-from solver.illumination.pyramids import DISTANCE, NORMAL, make_sight, raise_pyramid
-from solver.illumination.source_light import (
-    Desk,
-    Elements,
-    Light,
-    add_waiting,
-    height_before,
-    lay,
-    make_desk,
-)
+from solver.illumination.pyramids import DISTANCE, NORMAL, SIDES, make_sight, raise_pyramid
+from solver.illumination.source_light import add_waiting
 from solver.illumination.visible_parts import factor_of
 from solver.kernels import kernel
 from solver.types import Corners, FloatArray, IntArray, Points
@@ -117,8 +110,8 @@ def _sources(
     luminance = light.luminance
     block = desk.block
     lane = desk.lane
-    buffers = desk.buffers
-    work = buffers.work
+    stack = desk.buffers.stack
+    work = desk.buffers.work
     found = 0
     lanes = 0
     total = 0.0
@@ -135,7 +128,8 @@ def _sources(
                 factor = block[FACTOR + k] if block[HIGHEST + k] > 0.0 else 0.0
                 if block[LOWEST + k] < 0.0 and block[HIGHEST + k] > 0.0:
                     polygon_of_lane(block, k, corner_count[source], work, WHOLE)
-                    factor = factor_of(work, ABOVE, clip_above(buffers, corner_count[source], normal), normal)
+                    count = clip_above(work, stack, corner_count[source], normal)
+                    factor = factor_of(work, ABOVE, count, normal)
                 if factor > 0.0:
                     sources[found] = source
                     found += 1
@@ -164,7 +158,7 @@ def _shaft(
         planes[0, axis] = -pyramid[0, NORMAL + axis]
         planes[1, axis] = normal[axis]
         for k in range(sides):
-            planes[2 + k, axis] = pyramid[0, 3 * k + axis]
+            planes[2 + k, axis] = pyramid[0, SIDES + 3 * k + axis]
     for k in range(2 + sides):
         planes[k, 3] = planes[k, 0] * x[0] + planes[k, 1] * x[1] + planes[k, 2] * x[2]
     planes[0, 3] -= pyramid[0, DISTANCE]

@@ -5,18 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from solver.illumination.cuts import ABOVE, WHOLE, clip_above
+from solver.illumination.desk import Desk, Elements, Light, height_before, lay, make_desk, relative_polygon
 from solver.illumination.factor_lanes import LANES
 from solver.illumination.pyramids import HIDDEN, Sight, cull, make_sight, raise_pyramid
-from solver.illumination.source_light import (
-    Desk,
-    Elements,
-    Light,
-    add_waiting,
-    height_before,
-    lay,
-    make_desk,
-    relative_polygon,
-)
+from solver.illumination.source_light import add_waiting
 from solver.illumination.visible_parts import clip_by_pyramids, factor_of
 from solver.kernels import kernel
 from solver.types import FloatArray, Int64Array, IntArray, Points
@@ -136,20 +128,21 @@ def _lamp_factor(
     factor = 0.0
     if lamps.kind[row] != NONE and height_before(x, corners, s, normals, s) > tolerance:
         relative_polygon(x, corners, s, sides, buffers.work, WHOLE)
-        count = clip_above(buffers, sides, normal)
+        count = clip_above(buffers.work, buffers.stack, sides, normal)
         first = lamps.blocker_start[row]
         raise_pyramid(x, corners, s, sides, normals, s, 0.0, desk.pyramid, 0)
         kept = 0
         if count > 0:
             kept = cull(
                 x, point, normal, buffers.work, ABOVE, count, desk.pyramid, 0, sides, lamps.pool, first,
-                first + lamps.blocker_count[row], sight, tolerance, desk.pool, 0,
+                first + lamps.blocker_count[row], sight.corners, sight.sides, sight.normals, sight.pyramids,
+                sight.raised, tolerance, desk.pool, 0,
             )  # fmt: skip
         if kept == 0:
             factor = factor_of(buffers.work, ABOVE, count, normal)
         elif kept != HIDDEN:
             factor, _ = clip_by_pyramids(
-                normal, count, desk.pool, 0, kept, sight.pyramids, sight.sides, tolerance, buffers,
-                desk.parts, desk.part_count,
+                normal, count, desk.pool, 0, kept, sight.pyramids, sight.sides, tolerance, buffers.stack,
+                buffers.corners, buffers.blocker, buffers.work, desk.parts, desk.part_count,
             )  # fmt: skip
     return max(0.0, factor)

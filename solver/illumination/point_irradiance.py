@@ -14,10 +14,10 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.desk import Elements, Light
 from solver.illumination.gather_anywhere import gather_anywhere
 from solver.illumination.gather_over_links import Table, gather_over_links
 from solver.illumination.light import Lamps, LinksByElement, Sources
-from solver.illumination.source_light import Elements, Light
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable

@@ -3,8 +3,8 @@
 Places are taken from the point, so that the pyramid's sides have no offset: a place is hidden if it is above
 all sides, and beyond the plane.
 
-Kernels here and in `visible_parts` take whole arrays with the row that is meant, and have one exit: views of
-rows, and returns from within, have numba count references at every call, which took more than half the time.
+Small kernels are inlined, and take whole arrays and the row that is meant. numba counts references to arrays
+where a kernel is called that may fail, and to views of rows: that took more than half of the time.
 """
 
 from __future__ import annotations
@@ -14,14 +14,19 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from solver.kernels import kernel
+from solver.kernels import inline_kernel, kernel
 from solver.types import Corners, FloatArray, Int64Array, IntArray
 
-NORMAL: Final = 12
-DISTANCE: Final = 15
-PYRAMID: Final = 16
-"""Columns of a pyramid's row: unit normals of four sides, inside above; the plane's unit normal away from the
-point; its distance in metres, 0 where the point is on it and nothing is hidden."""
+AXIS: Final = 0
+SINE: Final = 3
+COSINE: Final = 4
+DISTANCE: Final = 5
+NORMAL: Final = 6
+SIDES: Final = 9
+PYRAMID: Final = 21
+"""Columns of a pyramid's row: a cone around it, by unit axis, sine and cosine of half its angle; distance of
+the plane in metres, 0 where the point is on it and nothing is hidden; the plane's unit normal away from the
+point; unit normals of four sides, inside above."""
 
 CLEAR: Final = -1
 PLANE: Final = 16
@@ -30,12 +35,24 @@ PLANE: Final = 16
 HIDDEN: Final = -1
 """In place of a number of blockers: one of them hides all there is."""
 
+_ROUNDING: Final = 1e-15
+"""By how much more than they must the cosine of two axes has to differ for their cones to be apart."""
+
 SLIVER: Final = 1e-14
 """What reaches past a side by less than this angle does not: so much may rounding make of an edge that two
 blockers, or blocker and source, have in common."""
 
 
-@kernel
+@inline_kernel
+def _cone_around(x: float, y: float, z: float, radius: float) -> tuple[float, float, float, float, float]:
+    """Unit axis, sine and cosine of half the angle of the cone around a sphere; the sine is 1 within it."""
+    away = math.sqrt(x * x + y * y + z * z)
+    scale = 1.0 / away if away > 0.0 else 0.0
+    sine = radius * scale if radius < away else 1.0
+    return x * scale, y * scale, z * scale, sine, math.sqrt(1.0 - sine * sine)
+
+
+@inline_kernel
 def raise_pyramid(
     x: FloatArray,
     corners: Corners,
@@ -55,50 +72,89 @@ def raise_pyramid(
     distance = 0.0
     for axis in range(3):
         distance += normals[plane, axis] * (corners[polygon, 0, axis] - x[axis])
-    if abs(distance) <= tolerance:
-        pyramids[row, DISTANCE] = 0.0
-    else:
-        sign = 1.0 if distance > 0.0 else -1.0
-        for axis in range(3):
-            pyramids[row, NORMAL + axis] = sign * normals[plane, axis]
-        pyramids[row, DISTANCE] = sign * distance
-        last = count - 1
-        for k in range(count):
-            ax = corners[polygon, last, 0] - x[0]
-            ay = corners[polygon, last, 1] - x[1]
-            az = corners[polygon, last, 2] - x[2]
-            # Not from corner to corner: the cross product would lose the digits of what is small or far off.
-            ex = corners[polygon, k, 0] - corners[polygon, last, 0]
-            ey = corners[polygon, k, 1] - corners[polygon, last, 1]
-            ez = corners[polygon, k, 2] - corners[polygon, last, 2]
-            sx = ay * ez - az * ey
-            sy = az * ex - ax * ez
-            sz = ax * ey - ay * ex
-            length = math.sqrt(sx * sx + sy * sy + sz * sz)
-            if length > 0.0:
-                pyramids[row, 3 * k] = sign * sx / length
-                pyramids[row, 3 * k + 1] = sign * sy / length
-                pyramids[row, 3 * k + 2] = sign * sz / length
-            else:
-                # An edge without length cuts nothing: all that is beyond the plane is above it.
-                for axis in range(3):
-                    pyramids[row, 3 * k + axis] = pyramids[row, NORMAL + axis]
-            last = k
-
-
-@kernel
-def sliver_of(polygons: FloatArray, slot: int, count: int) -> float:
-    """Metres by which a polygon may reach past a side and does not: a row of polygons (s, n, 3)."""
+    sign = 1.0 if distance > 0.0 else -1.0
+    for axis in range(3):
+        pyramids[row, NORMAL + axis] = sign * normals[plane, axis]
+    pyramids[row, DISTANCE] = abs(distance) if abs(distance) > tolerance else 0.0
+    cx = cy = cz = 0.0
+    for k in range(count):
+        cx += (corners[polygon, k, 0] - x[0]) / count
+        cy += (corners[polygon, k, 1] - x[1]) / count
+        cz += (corners[polygon, k, 2] - x[2]) / count
     square = 0.0
     for k in range(count):
-        here = 0.0
-        for axis in range(3):
-            here += polygons[slot, k, axis] * polygons[slot, k, axis]
-        square = max(square, here)
-    return SLIVER * math.sqrt(square)
+        dx = corners[polygon, k, 0] - x[0] - cx
+        dy = corners[polygon, k, 1] - x[1] - cy
+        dz = corners[polygon, k, 2] - x[2] - cz
+        here = dx * dx + dy * dy + dz * dz
+        square = here if here > square else square
+    ax, ay, az, sine, cosine = _cone_around(cx, cy, cz, math.sqrt(square))
+    pyramids[row, AXIS] = ax
+    pyramids[row, AXIS + 1] = ay
+    pyramids[row, AXIS + 2] = az
+    pyramids[row, SINE] = sine
+    pyramids[row, COSINE] = cosine
+    last = count - 1
+    for k in range(count):
+        ax = corners[polygon, last, 0] - x[0]
+        ay = corners[polygon, last, 1] - x[1]
+        az = corners[polygon, last, 2] - x[2]
+        # Not from corner to corner: the cross product would lose the digits of what is small or far away.
+        ex = corners[polygon, k, 0] - corners[polygon, last, 0]
+        ey = corners[polygon, k, 1] - corners[polygon, last, 1]
+        ez = corners[polygon, k, 2] - corners[polygon, last, 2]
+        sx = ay * ez - az * ey
+        sy = az * ex - ax * ez
+        sz = ax * ey - ay * ex
+        length = math.sqrt(sx * sx + sy * sy + sz * sz)
+        scale = sign / length if length > 0.0 else 0.0
+        # An edge without length cuts nothing: all that is beyond the plane is above it.
+        instead = 0.0 if length > 0.0 else 1.0
+        pyramids[row, SIDES + 3 * k] = scale * sx + instead * pyramids[row, NORMAL]
+        pyramids[row, SIDES + 3 * k + 1] = scale * sy + instead * pyramids[row, NORMAL + 1]
+        pyramids[row, SIDES + 3 * k + 2] = scale * sz + instead * pyramids[row, NORMAL + 2]
+        last = k
 
 
-@kernel
+@inline_kernel
+def cone_of(polygons: FloatArray, slot: int, count: int) -> tuple[float, float, float, float, float, float]:
+    """A cone around a row of polygons (s, n, 3): axis, sine and cosine of half its angle; and its sliver.
+
+    The cone is that of a sphere around the middle of the corners. The sliver: by so many metres the polygon
+    may reach past a side and does not.
+    """
+    cx = cy = cz = 0.0
+    for k in range(count):
+        cx += polygons[slot, k, 0]
+        cy += polygons[slot, k, 1]
+        cz += polygons[slot, k, 2]
+    cx /= count
+    cy /= count
+    cz /= count
+    square = 0.0
+    for k in range(count):
+        dx = polygons[slot, k, 0] - cx
+        dy = polygons[slot, k, 1] - cy
+        dz = polygons[slot, k, 2] - cz
+        here = dx * dx + dy * dy + dz * dz
+        square = here if here > square else square
+    radius = math.sqrt(square)
+    ax, ay, az, sine, cosine = _cone_around(cx, cy, cz, radius)
+    return ax, ay, az, sine, cosine, SLIVER * (radius + math.sqrt(cx * cx + cy * cy + cz * cz))
+
+
+@inline_kernel
+def cones_part(
+    x: float, y: float, z: float, sine: float, cosine: float, pyramids: FloatArray, row: int
+) -> bool:
+    """Whether a cone and the one around a pyramid have only the point in common."""
+    other = pyramids[row, SINE]
+    along = x * pyramids[row, AXIS] + y * pyramids[row, AXIS + 1] + z * pyramids[row, AXIS + 2]
+    limit = cosine * pyramids[row, COSINE] - sine * other - _ROUNDING
+    return bool(along < limit and sine < 1.0 and other < 1.0)
+
+
+@inline_kernel
 def sides_cut(
     polygons: FloatArray,
     slot: int,
@@ -114,28 +170,26 @@ def sides_cut(
     Bits 0 to 3 are the sides, PLANE the blocker's own. 0 if all of the polygon is hidden, CLEAR if all of it
     is before the blocker or outside one side. `tolerance` is that of the plane, `sliver` that of the sides.
     """
-    cut = CLEAR
-    if pyramids[row, DISTANCE] > 0.0:
-        cut = 0
-        side = -1
-        while side < sides and cut != CLEAR:
-            at = NORMAL if side < 0 else 3 * side
-            offset = pyramids[row, DISTANCE] if side < 0 else 0.0
-            margin = tolerance if side < 0 else sliver
-            a = pyramids[row, at]
-            b = pyramids[row, at + 1]
-            c = pyramids[row, at + 2]
-            low = math.inf
-            high = -math.inf
-            for k in range(count):
-                height = a * polygons[slot, k, 0] + b * polygons[slot, k, 1] + c * polygons[slot, k, 2]
-                low = height if height < low else low
-                high = height if height > high else high
-            if high - offset <= margin:
-                cut = CLEAR
-            elif low - offset < -margin:
-                cut |= PLANE if side < 0 else 1 << side
-            side += 1
+    cut = 0 if pyramids[row, DISTANCE] > 0.0 else CLEAR
+    side = -1
+    while side < sides and cut != CLEAR:
+        at = NORMAL if side < 0 else SIDES + 3 * side
+        offset = pyramids[row, DISTANCE] if side < 0 else 0.0
+        margin = tolerance if side < 0 else sliver
+        a = pyramids[row, at]
+        b = pyramids[row, at + 1]
+        c = pyramids[row, at + 2]
+        low = math.inf
+        high = -math.inf
+        for k in range(count):
+            height = a * polygons[slot, k, 0] + b * polygons[slot, k, 1] + c * polygons[slot, k, 2]
+            low = height if height < low else low
+            high = height if height > high else high
+        if high - offset <= margin:
+            cut = CLEAR
+        elif low - offset < -margin:
+            cut |= PLANE if side < 0 else 1 << side
+        side += 1
     return cut
 
 
@@ -161,7 +215,7 @@ def make_sight(corners: Corners, sides: IntArray, normals: FloatArray) -> Sight:
     return Sight(corners, sides, normals, np.empty((b, PYRAMID)), np.full(b, -1, dtype=np.int64))
 
 
-@kernel
+@inline_kernel
 def _stands_aside(
     x: FloatArray,
     normal: FloatArray,
@@ -174,24 +228,23 @@ def _stands_aside(
 ) -> bool:
     """Whether a polygon is below the horizon, beyond a source, or outside one side of what is before it."""
     aside = False
-    side = -2
-    while side < sides and not aside:
-        aside = True
-        k = 0
-        while k < count and aside:
+    for side in range(-2, sides):
+        at = NORMAL if side < 0 else SIDES + 3 * side
+        all_out = not aside
+        for k in range(count if all_out else 0):
             dx = corners[polygon, k, 0] - x[0]
             dy = corners[polygon, k, 1] - x[1]
             dz = corners[polygon, k, 2] - x[2]
+            over_horizon = normal[0] * dx + normal[1] * dy + normal[2] * dz
+            height = sources[source, at] * dx + sources[source, at + 1] * dy + sources[source, at + 2] * dz
             if side == -2:
-                aside = normal[0] * dx + normal[1] * dy + normal[2] * dz <= 0.0
+                out = over_horizon <= 0.0
+            elif side == -1:
+                out = height >= sources[source, DISTANCE]
             else:
-                at = NORMAL if side < 0 else 3 * side
-                height = (
-                    sources[source, at] * dx + sources[source, at + 1] * dy + sources[source, at + 2] * dz
-                )
-                aside = height >= sources[source, DISTANCE] if side < 0 else height <= 0.0
-            k += 1
-        side += 1
+                out = height <= 0.0
+            all_out = all_out and out
+        aside = aside or all_out
     return aside
 
 
@@ -209,7 +262,11 @@ def cull(
     blockers: IntArray,
     first: int,
     stop: int,
-    sight: Sight,
+    corners: Corners,
+    sides: IntArray,
+    normals: FloatArray,
+    pyramids: FloatArray,
+    raised: Int64Array,
     tolerance: float,
     out: IntArray,
     used: int,
@@ -217,27 +274,21 @@ def cull(
     """Which of blockers[first : stop] may hide some of a source from a point x (3,), to out[used:].
 
     The source's part above the horizon is a row of polygons (s, n, 3), relative to x; its own pyramid is a
-    row of sources (p, PYRAMID). `point` is the number of x: rows of `sight` for other points are raised anew.
-    Returns how many there are, or HIDDEN.
+    row of sources (p, PYRAMID). corners ... raised are those of a `Sight`; `point` is the number of x, what
+    is raised for another is raised anew. Returns how many there are, or HIDDEN.
     """
-    corners = sight.corners
-    sides = sight.sides
-    normals = sight.normals
-    pyramids = sight.pyramids
-    raised = sight.raised
-    sliver = sliver_of(polygons, slot, count)
+    ax, ay, az, sine, cosine, sliver = cone_of(polygons, slot, count)
     kept = 0
-    b = first
-    while b < stop:
+    for b in range(first, stop):
         blocker = blockers[b]
-        b += 1
         if raised[blocker] != point:
             raise_pyramid(x, corners, blocker, sides[blocker], normals, blocker, tolerance, pyramids, blocker)
             raised[blocker] = point
-        cut = sides_cut(polygons, slot, count, pyramids, blocker, sides[blocker], tolerance, sliver)
+        cut = CLEAR
+        if kept != HIDDEN and not cones_part(ax, ay, az, sine, cosine, pyramids, blocker):
+            cut = sides_cut(polygons, slot, count, pyramids, blocker, sides[blocker], tolerance, sliver)
         if cut == 0:
             kept = HIDDEN
-            b = stop
         elif cut != CLEAR and not _stands_aside(
             x, normal, corners, blocker, sides[blocker], sources, source, source_sides
         ):

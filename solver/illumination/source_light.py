@@ -10,13 +10,11 @@ exact, but for what brings no more than an allowance altogether: it counts with 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
-import numpy as np
-
-from solver.illumination.cuts import ABOVE, PER_BLOCKER, ROOM, WHOLE, Buffers, clip_above, make_buffers
+from solver.illumination.cuts import ABOVE, PER_BLOCKER, WHOLE, clip_above
+from solver.illumination.desk import DEPTH, PARTS, Desk, Elements, Light
 from solver.illumination.factor_lanes import (
-    BLOCK,
     FACTOR,
     HIGHEST,
     INWARDS,
@@ -27,129 +25,16 @@ from solver.illumination.factor_lanes import (
     find_factors,
     polygon_of_lane,
 )
-from solver.illumination.pyramids import HIDDEN, PYRAMID, Sight, cull, raise_pyramid
+from solver.illumination.pyramids import HIDDEN, Sight, cull, raise_pyramid
 from solver.illumination.visible_parts import clip_by_pyramids, factor_of
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray, IntArray, Points
-
-_DEPTH: Final = 512
-"""Elements waiting to be looked at; where there are more, they are not entered."""
-
-_PARTS: Final = 64
-"""Visible pieces whose place is looked at; those that are more count as much as these do."""
-
-_LISTS: Final = 4096
-"""Room for the blockers of elements that wait, beside those of the sources; where it is used up, elements
-have all blockers of their parents."""
+from solver.types import FloatArray, Points
 
 _NEAR: Final = 1.0
 """Within this times its diagonal the points that stand for an element tell too little of a gradient on it."""
 
 _MISSED: Final = 0.2
 """Part of the linear variation of an element's radiosity that they then miss."""
-
-
-class Elements(NamedTuple):
-    """What is asked of the n elements of a tree over p patches."""
-
-    child: IntArray
-    child_count: IntArray
-    corners: Corners
-    corner_count: IntArray
-    patch: IntArray
-    centroid: Points
-    axes: FloatArray
-    """(p, 2, 3)"""
-    normals: FloatArray
-    """(p, 3)"""
-
-
-class Light(NamedTuple):
-    """Radiosity on n elements, as in `light.Sources`."""
-
-    functions: FloatArray
-    luminance: FloatArray
-    spread: FloatArray
-    slope: FloatArray
-    extent: FloatArray
-
-
-class Desk(NamedTuple):
-    """Elements that wait to be looked at, and what the work on them needs."""
-
-    element: IntArray
-    """(_DEPTH,)"""
-    first: IntArray
-    """(_DEPTH,) where their blockers begin in `pool`"""
-    blockers: IntArray
-    """(_DEPTH,) how many there are"""
-    visibility: FloatArray
-    """(_DEPTH,) of their links"""
-    pool: IntArray
-    """patches that may hide something, lists one behind the other"""
-    lane: IntArray
-    """(LANES, 3) element, first and blockers of each lane"""
-    lane_visibility: FloatArray
-    """(LANES,)"""
-    block: FloatArray
-    """(BLOCK,)"""
-    pyramid: FloatArray
-    """(1, PYRAMID) an element's own, as a source"""
-    place: FloatArray
-    """(4,) weight, and place times weight, whence its light comes"""
-    parts: FloatArray
-    """(_PARTS, ROOM, 3) its visible pieces"""
-    part_count: IntArray
-    """(_PARTS,)"""
-    buffers: Buffers
-
-
-@kernel
-def make_desk(most_blockers: int) -> Desk:
-    """For elements with so many blockers at most."""
-    return Desk(
-        np.empty(_DEPTH, dtype=np.int32),
-        np.empty(_DEPTH, dtype=np.int32),
-        np.empty(_DEPTH, dtype=np.int32),
-        np.empty(_DEPTH),
-        np.empty((LANES + 1) * most_blockers + _LISTS, dtype=np.int32),
-        np.empty((LANES, 3), dtype=np.int32),
-        np.empty(LANES),
-        np.zeros(BLOCK),
-        np.empty((1, PYRAMID)),
-        np.empty(4),
-        np.empty((_PARTS, ROOM, 3)),
-        np.empty(_PARTS, dtype=np.int32),
-        make_buffers(most_blockers),
-    )
-
-
-@kernel
-def height_before(x: FloatArray, corners: Corners, polygon: int, normals: FloatArray, plane: int) -> float:
-    """Metres by which a point is before the front of a row of corners (n, 4, 3)."""
-    height = 0.0
-    for axis in range(3):
-        height += normals[plane, axis] * (x[axis] - corners[polygon, 0, axis])
-    return height
-
-
-@kernel
-def relative_polygon(
-    x: FloatArray, corners: Corners, polygon: int, count: int, polygons: FloatArray, slot: int
-) -> None:
-    """Write a row of corners (n, 4, 3), relative to the point, to a row of polygons (s, >= 4, 3)."""
-    for corner in range(count):
-        for axis in range(3):
-            polygons[slot, corner, axis] = corners[polygon, corner, axis] - x[axis]
-
-
-@kernel
-def lay(desk: Desk, at: int, element: int, first: int, blockers: int, visibility: float) -> None:
-    """Let an element wait at a place of the desk."""
-    desk.element[at] = element
-    desk.first[at] = first
-    desk.blockers[at] = blockers
-    desk.visibility[at] = visibility
 
 
 @kernel
@@ -272,20 +157,29 @@ def add_waiting(
     place = desk.place
     parts = desk.parts
     part_count = desk.part_count
-    buffers = desk.buffers
-    work = buffers.work
+    waiting_element = desk.element
+    waiting_first = desk.first
+    waiting_blockers = desk.blockers
+    waiting_visibility = desk.visibility
+    stack = desk.buffers.stack
+    stack_corners = desk.buffers.corners
+    stack_blocker = desk.buffers.blocker
+    work = desk.buffers.work
+    blocker_corners = sight.corners
+    blocker_sides = sight.sides
+    blocker_normals = sight.normals
     pyramids = sight.pyramids
-    sight_sides = sight.sides
-    spare = len(pool) - len(buffers.corners) // PER_BLOCKER
+    raised = sight.raised
+    spare = len(pool) - len(stack_corners) // PER_BLOCKER
     while top > 0:
         lanes = min(top, LANES)
         for k in range(lanes):
             top -= 1
-            e = desk.element[top]
+            e = waiting_element[top]
             lane[k, 0] = e
-            lane[k, 1] = desk.first[top]
-            lane[k, 2] = desk.blockers[top]
-            lane_visibility[k] = desk.visibility[top]
+            lane[k, 1] = waiting_first[top]
+            lane[k, 2] = waiting_blockers[top]
+            lane_visibility[k] = waiting_visibility[top]
             fill_lane(block, k, x, corners, e, corner_count[e], normals, patch[e])
         find_factors(block, normal[0], normal[1], normal[2])
         for k in range(lanes):
@@ -300,13 +194,13 @@ def add_waiting(
             factor = block[FACTOR + k] if block[HIGHEST + k] > 0.0 else 0.0
             if is_cut and block[HIGHEST + k] > 0.0:
                 polygon_of_lane(block, k, sides, work, WHOLE)
-                count = clip_above(buffers, sides, normal)
+                count = clip_above(work, stack, sides, normal)
                 factor = factor_of(work, ABOVE, count, normal)
             square = 0.0
             for axis in range(3):
                 square += (x[axis] - centroid[e, axis]) ** 2
             variation = spread[e] + (_MISSED * slope[e] if square < _NEAR * extent[e] else 0.0)
-            enters = child[e] >= 0 and factor * variation > limit and top + child_count[e] <= _DEPTH
+            enters = child[e] >= 0 and factor * variation > limit and top + child_count[e] <= DEPTH
             # Those who may hide some of it.
             brings = factor * luminance[e]
             if blockers > 0 and not enters and brings <= allowance:
@@ -319,7 +213,7 @@ def add_waiting(
                 raise_pyramid(x, corners, e, sides, normals, p, 0.0, pyramid, 0)
                 kept = cull(
                     x, point, normal, work, ABOVE, count, pyramid, 0, sides, pool, first, first + blockers,
-                    sight, tolerance, pool, used,
+                    blocker_corners, blocker_sides, blocker_normals, pyramids, raised, tolerance, pool, used,
                 )  # fmt: skip
                 if kept == HIDDEN:
                     factor = 0.0
@@ -330,7 +224,10 @@ def add_waiting(
             if factor > 0.0 and enters:
                 for c in range(child[e], child[e] + child_count[e]):
                     if luminance[c] > 0.0:
-                        lay(desk, top, c, first, blockers, lane_visibility[k])
+                        waiting_element[top] = c
+                        waiting_first[top] = first
+                        waiting_blockers[top] = blockers
+                        waiting_visibility[top] = lane_visibility[k]
                         top += 1
             elif factor > 0.0:
                 # What is seen of it.
@@ -338,10 +235,10 @@ def add_waiting(
                     place[row] = 0.0 if blockers > 0 or is_cut else block[WEIGHT + row * LANES + k]
                 if blockers > 0:
                     factor, found = clip_by_pyramids(
-                        normal, count, pool, first, first + blockers, pyramids, sight_sides, tolerance,
-                        buffers, parts, part_count,
+                        normal, count, pool, first, first + blockers, pyramids, blocker_sides, tolerance,
+                        stack, stack_corners, stack_blocker, work, parts, part_count,
                     )  # fmt: skip
-                    for part in range(min(found, _PARTS)):
+                    for part in range(min(found, PARTS)):
                         _weigh(normal, normals, p, parts, part, part_count[part], place)
                 elif is_cut:
                     _weigh(normal, normals, p, work, ABOVE, count, place)

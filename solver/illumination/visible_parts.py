@@ -25,7 +25,6 @@ from solver.illumination.cuts import (
     ROOM,
     VERTICES,
     WHOLE,
-    Buffers,
     clip_above,
     cut,
     halve,
@@ -37,17 +36,19 @@ from solver.illumination.pyramids import (
     NORMAL,
     PLANE,
     PYRAMID,
+    SIDES,
+    cone_of,
+    cones_part,
     raise_pyramid,
     sides_cut,
-    sliver_of,
 )
-from solver.kernels import kernel
+from solver.kernels import inline_kernel, kernel
 from solver.types import Corners, FloatArray, IntArray
 
 __all__ = ["PER_BLOCKER", "ROOM", "clip_by_pyramids", "factor_of", "visible_factor"]
 
 
-@kernel
+@inline_kernel
 def factor_of(polygons: FloatArray, slot: int, count: int, normal: FloatArray) -> float:
     """Form factor of a row of polygons (s, n, 3), relative to the point and above its horizon [H eq. 6.1]."""
     total = 0.0
@@ -83,22 +84,22 @@ def clip_by_pyramids(
     pyramids: FloatArray,
     sides: IntArray,
     tolerance: float,
-    buffers: Buffers,
+    stack: FloatArray,
+    corners: IntArray,
+    waiting_for: IntArray,
+    work: FloatArray,
     parts: FloatArray,
     part_count: IntArray,
 ) -> tuple[float, int]:
     """Form factor from a point with unit normal (3,) to what is visible of the polygon in slot ABOVE.
 
     It is convex, has `count` <= 5 corners, shows the point its front, and is overwritten. It is seen past
-    blockers[start : stop], rows of pyramids (b, PYRAMID) and of their numbers of sides (b,). The visible
-    pieces are written to parts (m, ROOM, 3) and part_count (m,): as many as fit.
+    blockers[start : stop], rows of pyramids (b, PYRAMID) and of their numbers of sides (b,). stack, corners,
+    waiting_for and work are those of `Buffers`. The visible pieces are written to parts (m, ROOM, 3) and
+    part_count (m,): as many as fit.
 
     Returns the form factor and the number of visible pieces.
     """
-    stack = buffers.stack
-    corners = buffers.corners
-    waiting_for = buffers.blocker
-    work = buffers.work
     for k in range(count):
         for axis in range(3):
             stack[0, k, axis] = work[ABOVE, k, axis]
@@ -117,12 +118,14 @@ def clip_by_pyramids(
         for k in range(n):
             for axis in range(3):
                 work[PIECE, k, axis] = stack[top, k, axis]
-        sliver = sliver_of(work, PIECE, n)
+        ax, ay, az, sine, cosine, sliver = cone_of(work, PIECE, n)
         hidden = False
         while b < stop and not hidden:
             blocker = blockers[b]
             b += 1
-            planes = sides_cut(work, PIECE, n, pyramids, blocker, sides[blocker], tolerance, sliver)
+            planes = CLEAR
+            if not cones_part(ax, ay, az, sine, cosine, pyramids, blocker):
+                planes = sides_cut(work, PIECE, n, pyramids, blocker, sides[blocker], tolerance, sliver)
             if planes != CLEAR:
                 # What is not hidden waits; if in the end nothing is, the piece stays whole.
                 waiting = top
@@ -133,7 +136,7 @@ def clip_by_pyramids(
                 side = -1
                 while side < sides[blocker] and hidden:
                     if planes & (PLANE if side < 0 else 1 << side) != 0:
-                        at = NORMAL if side < 0 else 3 * side
+                        at = NORMAL if side < 0 else SIDES + 3 * side
                         left, outside = cut(
                             work, here, left, pyramids[blocker, at], pyramids[blocker, at + 1],
                             pyramids[blocker, at + 2], pyramids[blocker, DISTANCE] if side < 0 else 0.0,
@@ -189,13 +192,12 @@ def visible_factor(
 
     Returns the form factor and the number of visible pieces: none where the point is behind the source.
     """
-    buffers = Buffers(stack, stack_count, stack_next, work)
     for k in range(source_count):
         for axis in range(3):
             work[WHOLE, k, axis] = source[k, axis] - x[axis]
     factor = 0.0
     found = 0
-    count = clip_above(buffers, source_count, normal) if _shows_front(work, WHOLE, source_count) else 0
+    count = clip_above(work, stack, source_count, normal) if _shows_front(work, WHOLE, source_count) else 0
     if count >= 3:
         number = stop - start
         pyramids = np.empty((number, PYRAMID))
@@ -206,7 +208,20 @@ def visible_factor(
             sides[k] = counts[p]
             raise_pyramid(x, corners, p, counts[p], normals, p, tolerance, pyramids, k)
         factor, found = clip_by_pyramids(
-            normal, count, rows, 0, number, pyramids, sides, tolerance, buffers, parts, part_count
+            normal,
+            count,
+            rows,
+            0,
+            number,
+            pyramids,
+            sides,
+            tolerance,
+            stack,
+            stack_count,
+            stack_next,
+            work,
+            parts,
+            part_count,
         )
     return factor, found
 

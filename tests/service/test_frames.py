@@ -79,12 +79,14 @@ def test_accept_decides_only_without_a_format(client: TestClient, settled: str) 
 
 
 def test_headers_tell_what_a_frame_is_worth(client: TestClient, settled: str) -> None:
-    headers = client.get(f"{settled}/frame").headers
+    headers = client.get(f"{settled}/frame", params={"wait": "converged"}).headers
+    coarse = client.get(f"{settled}/frame", params={"renderer": "gouraud"}).headers
     status = client.get(settled).json()
     assert headers["x-revision"] == "1"
     assert headers["x-converged"] == "true"
     assert headers["x-renderer"] == "interpolant"
-    assert float(headers["x-error-estimate"]) == pytest.approx(status["error_estimate"], rel=1e-4)
+    assert float(coarse["x-error-estimate"]) == pytest.approx(status["error_estimate"], rel=1e-4)
+    assert 0.0 < float(headers["x-error-estimate"]) < status["settings"]["error_tolerance"]
     assert float(headers["x-render-ms"]) > 0.0
     assert headers["cache-control"] == "no-cache"
 
