@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from benchmarks.tables import Target
 
-_SECTIONS: Final = ("solve", "accuracy", "rays", "frames", "service")
+_SECTIONS: Final = ("solve", "accuracy", "rays", "fine", "frames", "interpolants", "service")
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 
 
@@ -42,7 +42,15 @@ def bench(
     Everything runs on this machine alone, each measurement in a process of its own. Other work on the
     machine shows in the figures.
     """
-    from benchmarks import accuracy, frames, occlusion, serving, solving
+    from benchmarks import (
+        accuracy,
+        fine,
+        frames,
+        interpolant_frames,
+        occlusion,
+        serving,
+        solving,
+    )
     from benchmarks.isolation import in_own_process
     from benchmarks.machine import Machine
     from benchmarks.plan import SCENES, Options
@@ -51,7 +59,10 @@ def bench(
     every = tuple(name for name in SCENES if not (quick and name == _QUICK_LEAVES_OUT))
     options = Options(_named(scenes, SCENES, "--scenes") if scenes else every, quick)
     chosen = _named(only, _SECTIONS, "--only") if only else _SECTIONS
-    made = (module.section(options) for module in (solving, accuracy, occlusion, frames, serving))
+    modules = (
+        solving, accuracy, occlusion, fine, frames, interpolant_frames, serving
+    )  # fmt: skip
+    made = (module.section(options) for module in modules)
     plan = [section for section in made if section.name in chosen and section.jobs]
     if file is not None and not file.parent.is_dir():
         raise typer.BadParameter(f"there is no directory {file.parent}", param_hint="--json")

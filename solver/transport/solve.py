@@ -27,7 +27,7 @@ from solver.transport.refine import choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
-from solver.types import FloatArray, Points, Spectra
+from solver.types import Spectra
 from solver.visibility.bvh import Hierarchy
 from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene

@@ -12,8 +12,8 @@ from solver.illumination.point_irradiance import PointIrradiance
 from solver.pathtracing import PathTracer
 from solver.transport.solve import RadiositySolver
 from tests.illumination.fine import drain
-from tests.transport.solving import box, furnace, shelf, solved
 from tests.pathtracing.worlds import world
+from tests.transport.solving import box, furnace, shelf, solved
 
 
 def errors(solver: RadiositySolver) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.illumination.samples import NUDGE, place_samples
-from solver.types import FloatArray
+from solver.types import FloatArray, IntArray
 from tests.illumination.fine import edge, triangulated
 from tests.transport.solving import shelf, solved
 
@@ -13,7 +13,7 @@ SOLVER = solved(shelf(), 0.02)
 FLOOR = 0
 
 
-def places(mesh_position: FloatArray, triangles: FloatArray) -> FloatArray:
+def places(mesh_position: FloatArray, triangles: IntArray) -> FloatArray:
     v = mesh_position[triangles]
     return np.stack(
         [
