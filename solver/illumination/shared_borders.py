@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.seams import SeamLines, edges_on_lines
+from solver.illumination.seams import BorderEdges, SeamLines, edges_on_lines
 from solver.illumination.topology import Leaves, Topology
 from solver.kernels import kernel
 from solver.types import FloatArray, IntArray, Points
@@ -23,6 +23,10 @@ scene's size: the spacing of float32 in the unit box in which a scene is drawn."
 
 _ON_EDGE: Final = 1e-6
 """A place is taken in by an edge if its distance from the edge is at most this times the edge's length."""
+
+_THIN: Final = 4e-6
+"""A patch shares its borders if it is wider than this times the scene's size. Both sides of a thinner one may
+count as one line; what it leaves open is far narrower than a pixel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +50,10 @@ class SharedBorders:
 def share_borders(topology: Topology, leaves: Leaves, surfaces: Surfaces, lines: SeamLines) -> SharedBorders:
     """The places along the borders of the patches of `leaves`."""
     on = edges_on_lines(topology, leaves, surfaces, lines)
+    corners = surfaces.corners
+    spread = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=-1).max(axis=(1, 2))
+    is_wide = (surfaces.area > _THIN * surfaces.size * spread)[leaves.patch[on.edge >> 2]]
+    on = BorderEdges(on.edge[is_wide], on.line[is_wide], on.start[is_wide], on.end[is_wide])
     s = len(on.edge)
     vertex = np.concatenate([on.start, on.end])
     line = np.concatenate([on.line, on.line])

@@ -18,6 +18,12 @@ from solver.types import FloatArray, IntArray, Points
 _ROUNDING: Final = 2.0**-40
 """A height may be rounding if it is at most this times the coordinates: thousands of their last digits."""
 
+_TURNS: Final = 4
+"""Times that a triangle of a cell is turned, on average, before it is taken as it is."""
+
+_SURE: Final = 1e6
+"""Areas are certain in cells that are wider than this times what may be rounding."""
+
 _AREA: Final = 1e-9
 """The areas of triangles may miss that of their cell by this part of it."""
 
@@ -63,12 +69,15 @@ def _settle(
         base = node_start[patch[i]]
         start = ring_start[cells[i]]
         whole = 0.0
+        span = 0.0
         largest = 0.0
         for k in range(start, ring_start[cells[i] + 1]):
             for axis in range(3):
                 largest = max(largest, abs(position[base + ring[k], axis]))
+            span = max(span, _distance(position, base + ring[start], base + ring[k]))
             if k > start and k + 1 < ring_start[cells[i] + 1]:
                 whole += _area(position, base + ring[start], base + ring[k], base + ring[k + 1], normal)
+        flat = _ROUNDING * largest
         # What the lines of the cell run between.
         count = ring_start[cells[i] + 1] - start
         fixed = np.empty((edge_start[cells[i] + 1] - edge_start[cells[i]], 2), np.int32)
@@ -78,22 +87,26 @@ def _settle(
                 fixed[e, k] = (
                     ring[start + place] if place < count else inner[inner_start[cells[i]] + place - count]
                 )
-        # Each turn makes the lesser height of two triangles greater: they come to an end.
+        # Each turn makes the lesser height of two triangles greater; where all is rounding, patience ends it.
         t = first[i]
+        turns = _TURNS * (last[i] - first[i])
         while t < last[i]:
-            turned = _turn(
-                triangles, fixed, t, first[i], last[i], base, position, normal, _ROUNDING * largest
-            )
+            turned = turns > 0 and _turn(triangles, fixed, t, first[i], last[i], base, position, normal, flat)
+            turns -= turned
             t = first[i] if turned else t + 1
+        # In the thinnest of needles, rounding decides which area there is.
+        doubt = flat * span
+        if whole > _SURE * doubt:
+            doubt = 0.0
         total = 0.0
         for t in range(first[i], last[i]):
             area = _area(
                 position, base + triangles[t, 0], base + triangles[t, 1], base + triangles[t, 2], normal
             )
-            if not area > 0.0:
+            if not (area > 0.0 or area > -doubt):
                 return int(cells[i])
             total += area
-        if not abs(total - whole) <= _AREA * whole:
+        if not abs(total - whole) <= _AREA * whole + doubt * (last[i] - first[i]):
             return int(cells[i])
     return -1
 
@@ -133,7 +146,8 @@ def _turn(
                 d = triangles[u, (i + 2) % 3]
                 one = _height(position, base + a, base + d, base + c, normal)
                 other = _height(position, base + d, base + b, base + c, normal)
-                if min(one, other) <= min(height, _height(position, base + b, base + a, base + d, normal)):
+                lesser = min(height, _height(position, base + b, base + a, base + d, normal))
+                if not min(one, other) > lesser:
                     return False
                 triangles[t, 0], triangles[t, 1], triangles[t, 2] = a, d, c
                 triangles[u, 0], triangles[u, 1], triangles[u, 2] = d, b, c

@@ -7,8 +7,8 @@ vertices lie inside it, so that the larger leaf can take them into its outline.
 Vertices are shared within a patch where they are bit-identical, which neighbours in a subdivision are.
 An edge without an opposite edge is open: it lies on the border of its patch, or it faces smaller
 leaves. The second kind is found by walking back from the edge's end to its start over open edges that
-run straight against it. No tolerance decides who is neighbour to whom, only which way is straight on,
-so any number of extra vertices, at any difference in size, is found.
+run straight against it. No tolerance decides who is neighbour to whom, only which way is straight on but for
+rounding, so any number of extra vertices, at any difference in size, is found.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ import numpy as np
 from solver.kernels import inline_kernel, kernel
 from solver.types import BoolArray, Corners, Int64Array, IntArray, Points
 
-_STRAIGHT: Final = 1e-6
-"""Edges run against each other if the sine of their angle is at most this."""
+_STRAIGHT: Final = 2.0**-40
+"""A vertex is on an edge if its distance from the edge is at most this times the greatest coordinate: what
+rounding makes of a middle, thousands of times over, and less than the width of the thinnest needle."""
 
 _HASH: Final = -7046029254386353131
 """2^64 over the golden ratio, odd, as a signed number: Fibonacci hashing."""
@@ -89,7 +90,10 @@ def connect(leaves: Leaves) -> Topology:
     inside_start = np.zeros(4 * n + 1, dtype=np.int32)
     inside = np.empty(opened, dtype=np.int32)
     hanging_on = np.full(v, -1, dtype=np.int32)
-    total = _walk(vertex, end, position, leaf_start, leaf_edge, is_open, inside_start, inside, hanging_on)
+    off = _STRAIGHT * np.abs(position).max(initial=0.0)
+    total = _walk(
+        vertex, end, position, off, leaf_start, leaf_edge, is_open, inside_start, inside, hanging_on
+    )
     return Topology(
         vertex=vertex,
         position=position,
@@ -195,6 +199,7 @@ def _walk(
     vertex: IntArray,
     end: IntArray,
     position: Points,
+    off: float,
     start: IntArray,
     edges: IntArray,
     is_open: BoolArray,
@@ -217,7 +222,7 @@ def _walk(
         at = end[edge]
         taken = 0
         while at != goal:
-            onward = _straight_on(position, start, edges, end, is_open, at, goal)
+            onward = _straight_on(position, off, start, edges, end, is_open, at, goal)
             if onward < 0:
                 break
             steps[taken] = onward
@@ -241,6 +246,7 @@ def _walk(
 @inline_kernel
 def _straight_on(
     position: Points,
+    off: float,
     start: IntArray,
     edges: IntArray,
     end: IntArray,
@@ -248,7 +254,7 @@ def _straight_on(
     at: int,
     goal: int,
 ) -> int:
-    """The open edge that leaves `at` straight towards `goal` and not beyond it, or -1."""
+    """The open edge that leaves `at` towards `goal`, no more than `off` beside it nor beyond it, or -1."""
     dx = position[goal, 0] - position[at, 0]
     dy = position[goal, 1] - position[at, 1]
     dz = position[goal, 2] - position[at, 2]
@@ -266,7 +272,7 @@ def _straight_on(
         cy = dz * ex - dx * ez
         cz = dx * ey - dy * ex
         ahead = dx * ex + dy * ey + dz * ez
-        is_straight = cx * cx + cy * cy + cz * cz <= _STRAIGHT * _STRAIGHT * length * reach
+        is_straight = cx * cx + cy * cy + cz * cz <= off * off * reach
         if is_straight and ahead > 0.0 and (to == goal or length < reach):
             return int(edge)
     return -1

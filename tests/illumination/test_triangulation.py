@@ -21,6 +21,7 @@ from tests.illumination.triangles import (
     Segment,
     Spot,
     areas,
+    assert_conforming,
     assert_lawful,
     cells_of,
     edges_on,
@@ -273,6 +274,25 @@ def test_edges_that_cross_beside_an_edge_of_cells_cross_on_it() -> None:
     made = made_of(shape("square"), even(1), [(0, (0.0, 0.502), (0.4, 0.5)), (0, (0.5, 0.502), (0.3, 0.5))])
     on_side = made.position[made.position[:, 1] == 0.5, 0]
     np.testing.assert_allclose(np.sort(on_side), [0.0, 0.3, 1 / 3, 0.4, 0.5, 1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("aspect", [1e-5, 1e-7, 1e-9])
+def test_needles_are_tiled_whatever_crosses_them(aspect: float) -> None:
+    """Where only rounding tells what is flat, areas still add up to what rounding allows."""
+    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0] * 7.0
+    corners = (
+        np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.9, aspect, 0.0), (0.0, 0.6 * aspect, 0.0)]) @ turn
+    )
+    surfaces = surfaces_of(polygons([(x, y, z) for x, y, z in corners.tolist()]))
+    cells = cells_of(surfaces, uneven(2, 3))
+    edges = edges_on(
+        surfaces, [(0, (0.1, 0.2), (0.9, 0.7)), (0, (0.0, 0.9), (0.8, 0.1)), (0, (0.3, 0.0), (0.3, 1.0))]
+    )
+    made = triangulate(cells, surfaces, edges)
+    assert len(made.unresolved) == 0
+    assert_conforming(made, surfaces)
+    whole = np.abs(areas(made, surfaces)).sum()
+    assert whole == pytest.approx(surfaces.area[0], rel=1e-14 / aspect + 1e-9)
 
 
 def test_hundreds_of_collinear_edges_are_one_line() -> None:
