@@ -9,7 +9,7 @@ import numpy as np
 from solver.illumination.cuts import ROOM, Buffers, make_buffers
 from solver.illumination.factor_lanes import BLOCK, LANES
 from solver.illumination.pyramids import PYRAMID
-from solver.kernels import kernel
+from solver.kernels import inline_kernel, kernel
 from solver.types import Corners, FloatArray, IntArray, Points
 
 DEPTH: Final = 512
@@ -49,20 +49,18 @@ class Light(NamedTuple):
 
 
 class Desk(NamedTuple):
-    """Elements that wait to be looked at, and what the work on them needs."""
+    """Elements that wait to be looked at, or quarters of leaves, and what the work on them needs."""
 
-    element: IntArray
-    """(DEPTH,)"""
-    first: IntArray
-    """(DEPTH,) where their blockers begin in `pool`"""
-    blockers: IntArray
-    """(DEPTH,) how many there are"""
+    waiting: IntArray
+    """(DEPTH, 4) element; where its blockers begin in `pool`; how many there are; times it was quartered"""
+    polygon: FloatArray
+    """(DEPTH, 4, 3) corners relative to the point"""
     visibility: FloatArray
     """(DEPTH,) of their links"""
     pool: IntArray
     """patches that may hide something, lists one behind the other"""
     lane: IntArray
-    """(LANES, 3) element, first and blockers of each lane"""
+    """(LANES, 4) as `waiting`, of each lane"""
     lane_visibility: FloatArray
     """(LANES,)"""
     block: FloatArray
@@ -75,6 +73,8 @@ class Desk(NamedTuple):
     """(PARTS, ROOM, 3) its visible pieces"""
     part_count: IntArray
     """(PARTS,)"""
+    origin: FloatArray
+    """(3,) the point, where places are relative to it"""
     buffers: Buffers
 
 
@@ -82,29 +82,52 @@ class Desk(NamedTuple):
 def make_desk(most_blockers: int) -> Desk:
     """For elements with so many blockers at most."""
     return Desk(
-        np.empty(DEPTH, dtype=np.int32),
-        np.empty(DEPTH, dtype=np.int32),
-        np.empty(DEPTH, dtype=np.int32),
+        np.empty((DEPTH, 4), dtype=np.int32),
+        np.empty((DEPTH, 4, 3)),
         np.empty(DEPTH),
         np.empty((LANES + 1) * most_blockers + _LISTS, dtype=np.int32),
-        np.empty((LANES, 3), dtype=np.int32),
+        np.empty((LANES, 4), dtype=np.int32),
         np.empty(LANES),
         np.zeros(BLOCK),
         np.empty((1, PYRAMID)),
         np.empty(4),
         np.empty((PARTS, ROOM, 3)),
         np.empty(PARTS, dtype=np.int32),
+        np.zeros(3),
         make_buffers(most_blockers),
     )
 
 
+@inline_kernel
+def relative_polygon(
+    x: FloatArray, corners: Corners, polygon: int, count: int, polygons: FloatArray, slot: int
+) -> None:
+    """Write a row of corners (n, 4, 3), relative to the point, to a row of polygons (s, >= 4, 3)."""
+    for corner in range(count):
+        for axis in range(3):
+            polygons[slot, corner, axis] = corners[polygon, corner, axis] - x[axis]
+
+
 @kernel
-def lay(desk: Desk, at: int, element: int, first: int, blockers: int, visibility: float) -> None:
-    """Let an element wait at a place of the desk."""
-    desk.element[at] = element
-    desk.first[at] = first
-    desk.blockers[at] = blockers
-    desk.visibility[at] = visibility
+def lay(
+    waiting: IntArray,
+    polygons: FloatArray,
+    visibilities: FloatArray,
+    at: int,
+    x: FloatArray,
+    corners: Corners,
+    element: int,
+    first: int,
+    blockers: int,
+    visibility: float,
+) -> None:
+    """Let an element, of corners (n, 4, 3), wait at a place of the desk, for a point x (3,)."""
+    waiting[at, 0] = element
+    waiting[at, 1] = first
+    waiting[at, 2] = blockers
+    waiting[at, 3] = 0
+    visibilities[at] = visibility
+    relative_polygon(x, corners, element, 4, polygons, at)
 
 
 @kernel
@@ -114,13 +137,3 @@ def height_before(x: FloatArray, corners: Corners, polygon: int, normals: FloatA
     for axis in range(3):
         height += normals[plane, axis] * (x[axis] - corners[polygon, 0, axis])
     return height
-
-
-@kernel
-def relative_polygon(
-    x: FloatArray, corners: Corners, polygon: int, count: int, polygons: FloatArray, slot: int
-) -> None:
-    """Write a row of corners (n, 4, 3), relative to the point, to a row of polygons (s, >= 4, 3)."""
-    for corner in range(count):
-        for axis in range(3):
-            polygons[slot, corner, axis] = corners[polygon, corner, axis] - x[axis]

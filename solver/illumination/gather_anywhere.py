@@ -81,7 +81,18 @@ def gather_anywhere(
                 low, high, skip, leaf_first, leaf_count, order, planes, sides, side_tolerance,
                 desk.pool[used:],
             )  # fmt: skip
-            lay(desk, waiting, p, used, blockers, 1.0)
+            lay(
+                desk.waiting,
+                desk.polygon,
+                desk.visibility,
+                waiting,
+                x,
+                elements.corners,
+                p,
+                used,
+                blockers,
+                1.0,
+            )
             waiting += 1
             used += blockers
             if waiting == LANES or k == found - 1:

@@ -89,7 +89,18 @@ def gather_over_links(
                 begin = links.blocker_start[row]
                 for b in range(blockers):
                     desk.pool[used + b] = links.pool[begin + b]
-                lay(desk, waiting, source, used, blockers, links.visibility[row])
+                lay(
+                    desk.waiting,
+                    desk.polygon,
+                    desk.visibility,
+                    waiting,
+                    x,
+                    elements.corners,
+                    source,
+                    used,
+                    blockers,
+                    links.visibility[row],
+                )
                 waiting += 1
                 used += blockers
                 if waiting == LANES:

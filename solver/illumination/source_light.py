@@ -1,23 +1,22 @@
 """The light that a point receives from sources, element by element ([H 6.2]).
 
-A source is entered as far as its radiosity residual, times the point's form factor, is felt. What is left
-counts with the radiosity where the light that arrives from it comes from on average. Elements are taken in
-blocks, whose form factors are found in lanes; only those that the horizon cuts, or that blockers may hide,
-are looked at alone. An element's blockers are those of its parent that are not clear of it. Visible parts are
-exact, but for what brings no more than an allowance altogether: it counts with the visibility of its link.
+A source is entered as far as its radiosity residual, times the point's form factor, is felt; leaves are
+quartered where they are close and their gradient is felt. What is left counts with the radiosity where the
+light that arrives from it comes from on average. Elements are taken in blocks, whose form factors are found
+in lanes; only those that the horizon cuts, or that blockers may hide, are looked at alone. An element's
+blockers are those of its parent that are not clear of it. Visible parts are exact, but for what brings no
+more than an allowance altogether: it counts with the visibility of its link.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from solver.illumination.cuts import ABOVE, PER_BLOCKER, WHOLE, clip_above
-from solver.illumination.desk import DEPTH, PARTS, Desk, Elements, Light
+from solver.illumination.desk import DEPTH, PARTS, Desk, Elements, Light, lay
 from solver.illumination.factor_lanes import (
     FACTOR,
     HIGHEST,
-    INWARDS,
     LANES,
     LOWEST,
     WEIGHT,
@@ -28,13 +27,16 @@ from solver.illumination.factor_lanes import (
 from solver.illumination.pyramids import HIDDEN, Sight, cull, raise_pyramid
 from solver.illumination.visible_parts import clip_by_pyramids, factor_of
 from solver.kernels import kernel
-from solver.types import FloatArray, Points
+from solver.types import FloatArray, IntArray, Points
 
 _NEAR: Final = 1.0
-"""Within this times its diagonal the points that stand for an element tell too little of a gradient on it."""
+"""Within this times its diagonal the places that stand for an element tell too little of a gradient on it."""
 
 _MISSED: Final = 0.2
 """Part of the linear variation of an element's radiosity that they then miss."""
+
+_QUARTERED: Final = 8
+"""How often a leaf may be quartered for it."""
 
 
 @kernel
@@ -49,42 +51,77 @@ def _weigh(
 ) -> None:
     """Add to sums (4,) the weight, and the weighted place, of places on a row of polygons (s, n, 3).
 
-    It is convex and relative to the point. They lie between its middle and its corners, and weigh as much as
-    the light from there would count.
+    It is convex and relative to the point. They lie in the triangles around its first corner, where they are
+    exact for quadratics, and weigh as much as the light from there would count.
     """
-    cx = cy = cz = 0.0
-    for k in range(count):
-        cx += polygons[slot, k, 0] / count
-        cy += polygons[slot, k, 1] / count
-        cz += polygons[slot, k, 2] / count
-    ax = ay = az = 0.0
-    for k in range(1, count - 1):
-        ux = polygons[slot, k, 0] - polygons[slot, 0, 0]
-        uy = polygons[slot, k, 1] - polygons[slot, 0, 1]
-        uz = polygons[slot, k, 2] - polygons[slot, 0, 2]
-        vx = polygons[slot, k + 1, 0] - polygons[slot, 0, 0]
-        vy = polygons[slot, k + 1, 1] - polygons[slot, 0, 1]
-        vz = polygons[slot, k + 1, 2] - polygons[slot, 0, 2]
-        ax += uy * vz - uz * vy
-        ay += uz * vx - ux * vz
-        az += ux * vy - uy * vx
-    area = math.sqrt(ax * ax + ay * ay + az * az) / count
     sx = source_normals[plane, 0]
     sy = source_normals[plane, 1]
     sz = source_normals[plane, 2]
-    for k in range(count):
-        px = cx + INWARDS * (polygons[slot, k, 0] - cx)
-        py = cy + INWARDS * (polygons[slot, k, 1] - cy)
-        pz = cz + INWARDS * (polygons[slot, k, 2] - cz)
-        here = normal[0] * px + normal[1] * py + normal[2] * pz
-        there = -(sx * px + sy * py + sz * pz)
-        square = px * px + py * py + pz * pz
-        if here > 0.0 and there > 0.0:
-            weight = area * here * there / (square * square)
-            sums[0] += weight
-            sums[1] += weight * px
-            sums[2] += weight * py
-            sums[3] += weight * pz
+    ax = polygons[slot, 0, 0]
+    ay = polygons[slot, 0, 1]
+    az = polygons[slot, 0, 2]
+    for k in range(1, count - 1):
+        ux = polygons[slot, k, 0] - ax
+        uy = polygons[slot, k, 1] - ay
+        uz = polygons[slot, k, 2] - az
+        vx = polygons[slot, k + 1, 0] - ax
+        vy = polygons[slot, k + 1, 1] - ay
+        vz = polygons[slot, k + 1, 2] - az
+        area = abs(sx * (uy * vz - uz * vy) + sy * (uz * vx - ux * vz) + sz * (ux * vy - uy * vx))
+        for corner in range(3):
+            along = 4.0 / 6.0 if corner == 1 else 1.0 / 6.0
+            across = 4.0 / 6.0 if corner == 2 else 1.0 / 6.0
+            px = ax + along * ux + across * vx
+            py = ay + along * uy + across * vy
+            pz = az + along * uz + across * vz
+            here = normal[0] * px + normal[1] * py + normal[2] * pz
+            there = -(sx * px + sy * py + sz * pz)
+            square = px * px + py * py + pz * pz
+            if here > 0.0 and there > 0.0:
+                weight = area * here * there / (square * square)
+                sums[0] += weight
+                sums[1] += weight * px
+                sums[2] += weight * py
+                sums[3] += weight * pz
+
+
+@kernel
+def _quarter(
+    work: FloatArray,
+    count: int,
+    lane: IntArray,
+    k: int,
+    first: int,
+    blockers: int,
+    visibility: float,
+    waiting: IntArray,
+    polygons: FloatArray,
+    visibilities: FloatArray,
+    top: int,
+) -> None:
+    """Let the quarters of the polygon in slot WHOLE wait from `top` on, lane k's but for its blockers."""
+    for axis in range(3):
+        middle = 0.0
+        for corner in range(count):
+            middle += work[WHOLE, corner, axis] / count
+        for corner in range(4):
+            # A triangle's fourth is the one in the middle.
+            c = corner if corner < count else 0
+            here = work[WHOLE, c, axis]
+            ahead = 0.5 * (here + work[WHOLE, c + 1 if c + 1 < count else 0, axis])
+            behind = 0.5 * (here + work[WHOLE, c - 1 if c > 0 else count - 1, axis])
+            opposite = 0.5 * (work[WHOLE, 1, axis] + work[WHOLE, 2, axis])
+            at = top + corner
+            polygons[at, 0, axis] = here if corner < count else opposite
+            polygons[at, 1, axis] = ahead if corner < count else behind
+            polygons[at, 2, axis] = middle if count == 4 else (behind if corner < count else ahead)
+            polygons[at, 3, axis] = behind if count == 4 else polygons[at, 2, axis]
+    for at in range(top, top + 4):
+        waiting[at, 0] = lane[k, 0]
+        waiting[at, 1] = first
+        waiting[at, 2] = blockers
+        waiting[at, 3] = lane[k, 3] + 1
+        visibilities[at] = visibility
 
 
 @kernel
@@ -157,10 +194,10 @@ def add_waiting(
     place = desk.place
     parts = desk.parts
     part_count = desk.part_count
-    waiting_element = desk.element
-    waiting_first = desk.first
-    waiting_blockers = desk.blockers
-    waiting_visibility = desk.visibility
+    waiting = desk.waiting
+    polygons = desk.polygon
+    visibilities = desk.visibility
+    origin = desk.origin
     stack = desk.buffers.stack
     stack_corners = desk.buffers.corners
     stack_blocker = desk.buffers.blocker
@@ -175,12 +212,11 @@ def add_waiting(
         lanes = min(top, LANES)
         for k in range(lanes):
             top -= 1
-            e = waiting_element[top]
-            lane[k, 0] = e
-            lane[k, 1] = waiting_first[top]
-            lane[k, 2] = waiting_blockers[top]
-            lane_visibility[k] = waiting_visibility[top]
-            fill_lane(block, k, x, corners, e, corner_count[e], normals, patch[e])
+            for column in range(4):
+                lane[k, column] = waiting[top, column]
+            lane_visibility[k] = visibilities[top]
+            e = waiting[top, 0]
+            fill_lane(block, k, origin, polygons, top, corner_count[e], normals, patch[e])
         find_factors(block, normal[0], normal[1], normal[2])
         for k in range(lanes):
             e = lane[k, 0]
@@ -196,11 +232,18 @@ def add_waiting(
                 polygon_of_lane(block, k, sides, work, WHOLE)
                 count = clip_above(work, stack, sides, normal)
                 factor = factor_of(work, ABOVE, count, normal)
+            # How far its radiosity is from what one place tells.
             square = 0.0
             for axis in range(3):
-                square += (x[axis] - centroid[e, axis]) ** 2
-            variation = spread[e] + (_MISSED * slope[e] if square < _NEAR * extent[e] else 0.0)
-            enters = child[e] >= 0 and factor * variation > limit and top + child_count[e] <= DEPTH
+                middle = 0.0
+                for corner in range(sides):
+                    middle += block[(3 * corner + axis) * LANES + k]
+                square += (middle / sides) ** 2
+            smaller = 0.5 ** lane[k, 3]
+            missed = _MISSED * smaller * slope[e] if square < _NEAR * extent[e] * smaller * smaller else 0.0
+            children = child_count[e] if child[e] >= 0 else 4
+            variation = missed + (spread[e] if child[e] >= 0 else 0.0)
+            enters = factor * variation > limit and top + children <= DEPTH and lane[k, 3] < _QUARTERED
             # Those who may hide some of it.
             brings = factor * luminance[e]
             if blockers > 0 and not enters and brings <= allowance:
@@ -208,9 +251,10 @@ def add_waiting(
                 factor *= lane_visibility[k]
                 blockers = 0
             if blockers > 0 and factor > 0.0:
+                polygon_of_lane(block, k, sides, work, WHOLE)
                 if not is_cut:
                     polygon_of_lane(block, k, sides, work, ABOVE)
-                raise_pyramid(x, corners, e, sides, normals, p, 0.0, pyramid, 0)
+                raise_pyramid(origin, work, WHOLE, sides, normals, p, 0.0, pyramid, 0)
                 kept = cull(
                     x, point, normal, work, ABOVE, count, pyramid, 0, sides, pool, first, first + blockers,
                     blocker_corners, blocker_sides, blocker_normals, pyramids, raised, tolerance, pool, used,
@@ -221,14 +265,21 @@ def add_waiting(
                     first = used
                     blockers = kept
                     used += kept if enters else 0
-            if factor > 0.0 and enters:
-                for c in range(child[e], child[e] + child_count[e]):
+            if factor > 0.0 and enters and child[e] >= 0:
+                for c in range(child[e], child[e] + children):
                     if luminance[c] > 0.0:
-                        waiting_element[top] = c
-                        waiting_first[top] = first
-                        waiting_blockers[top] = blockers
-                        waiting_visibility[top] = lane_visibility[k]
+                        lay(
+                            waiting, polygons, visibilities, top, x, corners, c, first, blockers,
+                            lane_visibility[k],
+                        )  # fmt: skip
                         top += 1
+            elif factor > 0.0 and enters:
+                polygon_of_lane(block, k, sides, work, WHOLE)
+                _quarter(
+                    work, sides, lane, k, first, blockers, lane_visibility[k], waiting, polygons,
+                    visibilities, top,
+                )  # fmt: skip
+                top += children
             elif factor > 0.0:
                 # What is seen of it.
                 for row in range(4):
