@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.camera_query import CameraQuery
 from service.problems import INVALID, ProblemError
 from solver.document.fields import MAX_COORDINATE
+from solver.engine.overlays.backprojection import BackprojectionOverlay, Sources
 from solver.engine.overlays.base import DEFAULT_LIMIT, MAX_LIMIT, Overlay, OverlayRequest, Page
 from solver.engine.overlays.discontinuities import Activity, DiscontinuitiesOverlay
 from solver.engine.overlays.elements import MeshColour, MeshOverlay
@@ -243,6 +244,16 @@ class PlaceQuery(SeenQuery):
                 message = "without z this is a pixel, and a whole number that is not negative"
                 raise ProblemError.of_field(INVALID, ["query", name], message)
         return Pixel(int(self.x), int(self.y))
+
+
+class BackprojectionQuery(PlaceQuery, PagedQuery):
+    """From where, and on to what."""
+
+    sources: Sources = Field(default=Sources.EMITTING, description="`all`: whatever faces the point.")
+
+    def overlay(self) -> Overlay:
+        """The backprojection. Raises ProblemError."""
+        return BackprojectionOverlay(self.place(), self.sources, self.page())
 
 
 class ProbeQuery(PlaceQuery, ScaledQuery):

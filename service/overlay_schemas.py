@@ -245,3 +245,27 @@ class ProbeOverlayAnswer(Table):
     illuminance: list[float] = Field(description="lux, analytic")
     illuminance_interpolated: list[float] = Field(description="lux")
     exact_samples: list[bool] = Field(description="Whether all the interpolant's samples are exact.")
+
+
+class BackprojectionAnswer(Table):
+    """Sources as a point sees them: visible parts white, edges of blockers violet, other lines green."""
+
+    position: Triple
+    normal: Triple
+    receiver: int = Field(description="Patch that the point lies on.")
+    element: int
+    sources: Literal["emitting", "all"]
+    patch: list[int]
+    object: list[int]
+    face: list[int]
+    corners: list[_Quadrilateral] = Field(description="Of the whole source.")
+    corner_count: list[int]
+    emits: list[bool]
+    area_above_horizon: list[float] = Field(description="Of its part before the point's own surface.")
+    visible_fraction: list[float] = Field(description="Share of that area.")
+    form_factor: list[float] = Field(description="From the point to what is visible.")
+    form_factor_unoccluded: list[float] = Field(description="If nothing stood between.")
+    visible: list[list[Annotated[list[Triple], Field(min_length=3)]]] = Field(
+        description="Convex polygons that tile what is visible."
+    )
+    hidden: list[list[_Triangle]] = Field(description="Triangles that tile what is not.")

@@ -128,3 +128,11 @@ async def overlay_graph(query: Annotated[queries.GraphQuery, Query()], show: Sho
 async def overlay_probe(query: Annotated[queries.ProbeQuery, Query()], show: Show) -> Response:
     """The light at one point of a surface: analytic, interpolated, and their difference."""
     return await show(query)
+
+
+@router.get(f"{_ROOT}/backprojection", **_told(schemas.BackprojectionAnswer, 413))
+async def overlay_backprojection(
+    query: Annotated[queries.BackprojectionQuery, Query()], show: Show
+) -> Response:
+    """Sources as a point of a surface sees them: what is visible of each, what is hidden, and by what."""
+    return await show(query)

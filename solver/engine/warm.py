@@ -18,6 +18,7 @@ from solver.document.edits import MoveEdit, RemoveEdit, SetMaterialEdit
 from solver.document.models import MaterialDocument, TransformDocument
 from solver.engine.drawing import Drawing, encode
 from solver.engine.engine import Engine
+from solver.engine.overlays.backprojection import BackprojectionOverlay
 from solver.engine.overlays.base import OverlayRequest
 from solver.engine.overlays.places import Pixel
 from solver.engine.overlays.probe import ProbeOverlay
@@ -181,15 +182,16 @@ def _draw(drawing: Drawing) -> None:
 
 
 def _pick_and_probe(engine: Engine) -> None:
-    """What a pixel shows, and the overlay that evaluates both its interpolant and its point irradiance."""
+    """What a pixel shows, and the overlays that call what frames do not."""
     camera = engine.scene.cameras["main"]
     middle = Pixel(camera.width // 2, camera.height // 2)
     engine.pick(CameraChoice(), middle.x, middle.y)
-    request = OverlayRequest(ProbeOverlay(middle), CameraChoice())
-    while not engine.is_overlay_ready(request, complete=True):
-        engine.step(_SLICE)
-    for _ in engine.overlay(request):
-        pass
+    for overlay in (ProbeOverlay(middle), BackprojectionOverlay(middle)):
+        request = OverlayRequest(overlay, CameraChoice())
+        while not engine.is_overlay_ready(request, complete=True):
+            engine.step(_SLICE)
+        for _ in engine.overlay(request):
+            pass
 
 
 def _follow_links() -> None:

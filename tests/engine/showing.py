@@ -9,7 +9,7 @@ import numpy as np
 from solver.document.conversion import scene_of
 from solver.document.models import SceneDocument
 from solver.engine.engine import Engine
-from solver.engine.overlays.base import Overlay, OverlayRequest, Shown
+from solver.engine.overlays.base import Column, Overlay, OverlayRequest, Shown
 from solver.engine.requests import CameraChoice
 from solver.geometry.scene import Scene
 from solver.types import AnyArray
@@ -62,10 +62,19 @@ def show(engine: Engine, overlay: Overlay, complete: bool = True) -> Shown:
 
 
 def columns_of(shown: Shown) -> dict[str, AnyArray]:
-    """The columns as arrays; those in which there may be None, of objects."""
-    return {name: np.array(column) for name, column in shown.columns.items()}
+    """The columns as arrays: of objects where there may be None, or lists of different lengths."""
+    return {name: _array(column) for name, column in shown.columns.items()}
 
 
 def table(engine: Engine, overlay: Overlay) -> dict[str, AnyArray]:
     """The columns of a complete overlay."""
     return columns_of(show(engine, overlay))
+
+
+def _array(column: Column) -> AnyArray:
+    try:
+        return np.array(column)
+    except ValueError:
+        ragged = np.empty(len(column), dtype=object)
+        ragged[:] = list(column)
+        return ragged

@@ -41,6 +41,7 @@ OPERATIONS: Final = [
             "samples",
             "graph",
             "probe",
+            "backprojection",
         )
     ),
 ]

@@ -32,6 +32,7 @@ OVERLAYS: Final[dict[str, tuple[dict[str, Any], type[BaseModel]]]] = {
     "samples": ({}, schemas.SamplesAnswer),
     "graph": ({"triangle": 0, "kind": "difference"}, schemas.GraphAnswer),
     "probe": ({"x": 4, "y": 44}, schemas.ProbeOverlayAnswer),
+    "backprojection": ({"x": 0.45, "y": 0.45, "z": 0}, schemas.BackprojectionAnswer),
 }
 """What each needs, and what it is answered with"""
 
@@ -101,6 +102,7 @@ def test_overlays_are_tables_as_described(client: TestClient, room: str, name: s
     assert shown["objects"] == [o["id"] for o in room_document()["objects"]]
     facts = {"objects", "ends"} if name == "blockers" else {"objects"}
     facts |= {"triangles", "resolution", "lines"} if name == "graph" else set()
+    facts |= {"position", "normal"} if name == "backprojection" else set()
     columns = {key: value for key, value in shown.items() if isinstance(value, list) and key not in facts}
     assert {len(column) for column in columns.values()} == {shown["count"]}
     assert shown["count"] == shown["total"]
@@ -122,6 +124,7 @@ def test_overlays_are_tables_as_described(client: TestClient, room: str, name: s
         ("samples", {}, lambda s: {POINTS: s["count"], LINES: 2 * s["count"]}),
         ("graph", {}, lambda s: {LINES: 2 * len(s["lines"])}),
         ("probe", {}, lambda s: {POINTS: 1, LINES: 2}),
+        ("backprojection", {"limit": 0}, lambda s: {POINTS: 1}),
     ],
 )  # fmt: skip
 def test_files_hold_the_shapes(
@@ -218,6 +221,25 @@ def test_the_examples_of_the_documentation_are_calls_that_there_are() -> None:
     assert told == {*OVERLAYS, "pick"}
 
 
+def test_backprojections_take_points_and_pixels(client: TestClient, room: str) -> None:
+    lamp = overlay(client, room, "backprojection")
+    assert [lamp["objects"][k] for k in lamp["object"]] == ["lamp"]
+    assert 0.0 < lamp["visible_fraction"][0] < 1.0, "the crate hangs between"
+    assert lamp["visible"][0] and lamp["hidden"][0]
+    every = overlay(client, room, "backprojection", sources="all", limit=2)
+    assert every["total"] > every["count"] == 2
+    pixel = client.get(f"{room}/overlays/backprojection", params={"x": 4, "y": 44}).json()
+    picked = client.get(f"{room}/pick", params={"x": 4, "y": 44}).json()
+    assert pixel["position"] == pytest.approx(picked["point"], abs=1e-9)
+    assert (pixel["receiver"], pixel["element"]) == (picked["patch"], picked["element"])
+    drawn = shapes(client, room, "backprojection")
+    fans = sum(len(piece) - 2 for piece in lamp["visible"][0])
+    assert len(drawn[TRIANGLES][0]) == 3 * fans
+    assert {tuple(colour) for colour in drawn[LINES][1][:, :3].tolist()} == {
+        (115, 26, 230), (13, 178, 26),
+    }, "violet and green"  # fmt: skip
+
+
 # --- what is refused ---
 
 
@@ -260,6 +282,9 @@ def test_the_examples_of_the_documentation_are_calls_that_there_are() -> None:
         ("probe", {"x": 0, "y": 0, "z": 0, "patch": 99}, "patch"),
         ("probe", {"x": 0, "y": 0, "z": 1e99}, "z"),
         ("probe", {"x": 0, "y": 0, "camera": "side"}, "x"),
+        ("backprojection", {"x": 0}, "y"),
+        ("backprojection", {"x": 0, "y": 0, "z": 1.5}, "x"),
+        ("backprojection", {"x": 0, "y": 0, "sources": "some"}, "sources"),
     ],
 )
 def test_the_parameter_at_fault_is_named(

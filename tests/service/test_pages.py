@@ -12,6 +12,7 @@ from service.app import create_app
 
 OVERLAYS = (
     "mesh", "links", "blockers", "discontinuities", "triangulation", "samples", "graph", "probe",
+    "backprojection",
 )  # fmt: skip
 
 
