@@ -64,7 +64,8 @@ def test_a_furnace_is_as_bright_everywhere() -> None:
     # How the passes fall depends on the clock, and an RMS over some hundred elements scatters by itself.
     assert solver.error_estimate <= 0.04
     assert np.sqrt(field.area @ off**2 / field.area.sum()) < 1.25 * solver.error_estimate
-    assert abs(field.area @ off / field.area.sum()) < 2e-3
+    scatter = solver.error_estimate / np.sqrt(len(field.area))
+    assert abs(field.area @ off / field.area.sum()) < 4.0 * scatter
 
 
 def test_walls_of_a_lit_cube_agree_with_the_reference() -> None:
