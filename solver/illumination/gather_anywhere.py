@@ -22,7 +22,7 @@ from solver.kernels import kernel
 from solver.types import Corners, FloatArray, IntArray, Points
 from solver.visibility.bvh import walk_hierarchy
 
-_PLANES = 6
+PLANES = 6
 """Bounding planes of the hull of a point and a patch."""
 
 
@@ -55,19 +55,19 @@ def gather_anywhere(
     patches = len(elements.normals)
     desk = make_desk(len(order))
     sight = make_sight(elements.corners[:patches], elements.corner_count[:patches], elements.normals)
-    planes = np.empty((_PLANES, 4))
+    planes = np.empty((PLANES, 4))
     sources = np.empty(patches, dtype=np.int32)
     for i in range(start, stop):
         x = positions[i]
         normal = normals[i]
-        found, total = _sources(x, normal, elements, light, source_tolerance, desk, sources)
+        found, total = seen_sources(x, normal, elements, light, source_tolerance, desk, sources)
         for c in range(out.shape[1]):
             out[i, c] = 0.0
         waiting = 0
         used = 0
         for k in range(found):
             p = sources[k]
-            sides = _shaft(
+            sides = point_shaft(
                 x,
                 normal,
                 elements.corners,
@@ -105,7 +105,7 @@ def gather_anywhere(
 
 
 @kernel
-def _sources(
+def seen_sources(
     x: FloatArray,
     normal: FloatArray,
     elements: Elements,
@@ -150,7 +150,7 @@ def _sources(
 
 
 @kernel
-def _shaft(
+def point_shaft(
     x: FloatArray,
     normal: FloatArray,
     corners: Corners,
@@ -160,7 +160,7 @@ def _shaft(
     pyramid: FloatArray,
     planes: FloatArray,
 ) -> int:
-    """Planes (_PLANES, 4) around the hull of a point and a patch before which it is, as `shaft_planes`.
+    """Planes (PLANES, 4) around the hull of a point and a patch before which it is, as `shaft_planes`.
 
     pyramid (1, PYRAMID) is working space.
     """

@@ -28,11 +28,14 @@ from solver.visibility.bvh import Hierarchy
 DEFAULT_ACCURACY: Final = 1e-3
 """Share of the irradiance that one source may err by."""
 
-_ON_PLANE: Final = 1e-12
+ON_PLANE: Final = 1e-12
 """A point is on a blocker's plane within this times the scene's size: rounding alone."""
 
-_ON_SURFACE: Final = 1e-7
+ON_SURFACE: Final = 1e-7
 """The same for points that a client gives, with fewer digits."""
+
+_DARKNESS: Final = 1e-2
+"""Where there is less light than this share of the scene's mean irradiance, it need not be more accurate."""
 
 FEW_PATCHES: Final = 256
 """With so many patches or fewer it is sooner done to ask all of them than to follow links."""
@@ -62,6 +65,8 @@ class PointIrradiance:
     """(p, channels)"""
     weights: FloatArray
     """(channels,) of luminance"""
+    darkness: float
+    """W/m2 of luminance irradiance below which the error does not shrink with the light"""
 
     @staticmethod
     def of(
@@ -77,12 +82,12 @@ class PointIrradiance:
         Scenes of `few` patches or fewer do without links.
         """
         tree = state.tree
+        leaves = tree.leaves
+        received = tree.area[leaves] @ np.maximum(state.received[leaves, 0] @ state.weights, 0.0)
         by_element = lamps = None
         if tree.patch_count > few:
             by_element = LinksByElement.of(state.links, len(tree))
-            lamps = Lamps.of(
-                state.surfaces, hierarchy, tree.corners, tree.corner_count, tree.patch, tree.leaves
-            )
+            lamps = Lamps.of(state.surfaces, hierarchy, tree.corners, tree.corner_count, tree.patch, leaves)
         return PointIrradiance(
             surfaces=state.surfaces,
             hierarchy=hierarchy,
@@ -96,6 +101,7 @@ class PointIrradiance:
             received=state.received,
             emission=state.emission,
             weights=state.weights,
+            darkness=_DARKNESS * float(received) / max(float(tree.area[leaves].sum()), 1e-300),
         )
 
     def of_reflected(self) -> PointIrradiance:
@@ -124,7 +130,7 @@ class PointIrradiance:
         def work(start: int, stop: int) -> None:
             gather_anywhere(
                 positions, normals, self.accuracy, h.low, h.high, h.skip, h.first, h.count, h.order, elements,
-                light, tolerances.SIDE * size, _ON_SURFACE * size, _ON_PLANE * size, start, stop, out,
+                light, tolerances.SIDE * size, ON_SURFACE * size, ON_PLANE * size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)
@@ -149,13 +155,13 @@ class PointIrradiance:
             lamps.blocker_start, lamps.blocker_count, lamps.pool,
         )  # fmt: skip
         most = max(int(links.blocker_count.max(initial=0)), int(lamps.blocker_count.max(initial=0)))
-        expected = np.maximum(self.solved(positions, leaves) @ self.weights, 0.0)
+        expected = np.maximum(self.solved(positions, leaves) @ self.weights, self.darkness)
         out = np.empty((len(positions), self.emission.shape[1]))
 
         def work(start: int, stop: int) -> None:
             gather_over_links(
                 positions, normals, leaves, expected, self.accuracy, self.tree.parent, over, lit,
-                self.emission, elements, light, most, _ON_PLANE * self.surfaces.size, start, stop, out,
+                self.emission, elements, light, most, ON_PLANE * self.surfaces.size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)

@@ -29,11 +29,9 @@ from solver.illumination.visible_parts import clip_by_pyramids, factor_of
 from solver.kernels import kernel
 from solver.types import FloatArray, IntArray, Points
 
-_NEAR: Final = 1.0
-"""Within this times its diagonal the places that stand for an element tell too little of a gradient on it."""
-
-_MISSED: Final = 0.2
-"""Part of the linear variation of an element's radiosity that they then miss."""
+_MISSED: Final = 0.5
+"""Part of the linear variation of an element's radiosity that the places which stand for it miss at a point
+that touches it. It falls with the fourth power of the distance where that is greater than the element."""
 
 _QUARTERED: Final = 8
 """How often a leaf may be quartered for it."""
@@ -240,7 +238,9 @@ def add_waiting(
                     middle += block[(3 * corner + axis) * LANES + k]
                 square += (middle / sides) ** 2
             smaller = 0.5 ** lane[k, 3]
-            missed = _MISSED * smaller * slope[e] if square < _NEAR * extent[e] * smaller * smaller else 0.0
+            great = extent[e] * smaller * smaller
+            close = great / (great + square)
+            missed = _MISSED * close * close * smaller * slope[e]
             children = child_count[e] if child[e] >= 0 else 4
             variation = missed + (spread[e] if child[e] >= 0 else 0.0)
             enters = factor * variation > limit and top + children <= DEPTH and lane[k, 3] < _QUARTERED
