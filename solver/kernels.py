@@ -10,6 +10,7 @@ of the stamp by which a kept kernel is known to be fresh.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -42,21 +43,26 @@ def _compiled(function: Callable[..., object], forceinline: bool = False) -> Any
     return dispatcher
 
 
-def _ingredients(function: FunctionType) -> tuple[tuple[str, Any], ...]:
-    """Name and stamp of all that a kernel takes from its module, but for what is numpy's or Python's."""
-    known = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
-    return tuple((name, stamp) for name, value in known if (stamp := _stamp(value)) is not None)
+def _ingredients(function: FunctionType) -> str:
+    """A digest of all kernels and constants that a kernel's module knew by then.
+
+    Not of those alone that the kernel names: a helper that stands further down in the file is not known yet,
+    but what it takes in from other files, at the top, is.
+    """
+    known = ((name, _stamp(value)) for name, value in function.__globals__.items())
+    told = repr(sorted((name, stamp) for name, stamp in known if stamp is not None))
+    return hashlib.sha256(told.encode()).hexdigest()
 
 
-def _stamp(value: Any) -> Any:
+def _stamp(value: Any) -> str | None:
     if isinstance(value, Dispatcher):
-        return cast("Any", value)._cache._cache_file._source_stamp
+        return repr(cast("Any", value)._cache._cache_file._source_stamp)
     match value:
         case int() | float() | tuple() | np.generic():
             return repr(value)
         case np.ndarray():
-            return value.dtype.str, value.shape, value.tobytes()
+            return repr((value.dtype.str, value.shape, value.tobytes()))
         case ModuleType() if value.__name__.startswith("solver."):
-            return Path(str(value.__file__)).read_bytes()
+            return repr(Path(str(value.__file__)).read_bytes())
         case _:
             return None

@@ -57,3 +57,17 @@ def test_a_kernel_is_compiled_anew_when_what_it_takes_in_changes(
     (tmp_path / file).write_text(text)
     os.utime(tmp_path / file, ns=(1, 1))
     assert call(tmp_path) == (expected, 0)
+
+
+def test_helpers_further_down_in_the_file_count_too(tmp_path: Path) -> None:
+    (tmp_path / "helpers.py").write_text(HELPER.format(1.0))
+    (tmp_path / "limits.py").write_text("LIMIT = 10.0\n")
+    early = CALLER.replace("helper(x) * LIMIT", "later(x) * LIMIT").replace(
+        "if __name__", "@kernel\ndef later(x):\n    return helper(x)\n\nif __name__"
+    )
+    (tmp_path / "callers.py").write_text(early)
+    assert call(tmp_path) == (20.0, 0)
+    assert call(tmp_path) == (20.0, 1)
+    (tmp_path / "helpers.py").write_text(HELPER.format(2.0))
+    os.utime(tmp_path / "helpers.py", ns=(1, 1))
+    assert call(tmp_path) == (30.0, 0)

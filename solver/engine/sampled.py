@@ -26,6 +26,7 @@ from solver.pathtracing.element_means import PASS, ElementMeans, deal, explored
 from solver.transport.closure import is_closed
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.settings import SolverSettings
+from solver.transport.sliced import SlicedSolve
 from solver.transport.solve import SolverStatistics
 from solver.transport.state import TransportState
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array, IntArray, Points
@@ -60,19 +61,12 @@ _LEAST_PROBE_PATHS: Final = 256
 _PROBE_SEED: Final = 1
 
 
-class SampledSolver:
+class SampledSolver(SlicedSolve):
     """One sampled solution in the making."""
 
     def __init__(self, surfaces: Surfaces, rays: RayScene, settings: SolverSettings) -> None:
         """Set up the patches as the first elements; nothing is traced yet."""
-        self.surfaces = surfaces
-        self.settings = settings
-        self.outcome = SolveOutcome.RUNNING
-        self.error_estimate = 1.0
-        self.unshot_fraction = 1.0
-        self.progress = 0.0
-        self.version = 0
-        """Counts the changes of the field: once a round."""
+        super().__init__(surfaces, settings)
         self._rays = rays
         self._tracer = PathTracer(surfaces, rays)
         self._prober = PathTracer(surfaces, rays, _PROBE_SEED)
@@ -85,32 +79,11 @@ class SampledSolver:
         self._path_count = 0
         self._tracing = 0.0
         self._rounds = 0
-        self._seconds = 0.0
-        self._work = self._run()
-
-    def step(self, budget: float) -> bool:
-        """Work for about `budget` seconds; True while more remains."""
-        start = time.perf_counter()
-        while self.outcome is SolveOutcome.RUNNING:
-            if next(self._work, None) is None and self.outcome is SolveOutcome.RUNNING:
-                self.outcome = SolveOutcome.CONVERGED
-            if time.perf_counter() - start >= budget:
-                break
-        self._seconds += time.perf_counter() - start
-        return self.outcome is SolveOutcome.RUNNING
 
     @property
     def state(self) -> TransportState:
         """Elements without links, and the light that `field` tells."""
         return self._state
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know about this solution."""
-        told = self.surfaces.warnings
-        if self.outcome not in (SolveOutcome.RUNNING, SolveOutcome.CONVERGED):
-            told = (*told, self.outcome.value)
-        return told
 
     def statistics(self) -> SolverStatistics:
         """Counts at this moment; there are no links and no gathers."""

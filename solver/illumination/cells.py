@@ -3,11 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from solver.transport.field import RadiosityField
 from solver.types import BoolArray, Corners, FloatArray, IntArray
+
+
+class Leaves(Protocol):
+    """n polygons that tile patches, such as the leaves of a radiosity field; vertices are bit-identical."""
+
+    @property
+    def corners(self) -> Corners:
+        """(n, 4, 3) metres, counter-clockwise from the front; a triangle repeats its last corner"""
+        ...
+
+    @property
+    def corner_count(self) -> IntArray:
+        """(n,) 3 or 4"""
+        ...
+
+    @property
+    def patch(self) -> IntArray:
+        """(n,) index into the surfaces' patches"""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,39 +9,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.cells import Leaves
 from solver.illumination.segments import clip
 from solver.illumination.sets import DiscontinuitySets
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import plane_axes
-from solver.types import Corners, FloatArray, Int64Array, IntArray
+from solver.types import FloatArray, Int64Array, IntArray
 
 LEAF_BORDER: Final = 1e-6
 """A line passes through a leaf if some of it is further inside than this times the leaf's size."""
 
 _CHUNK: Final = 1024
 _LEAST: Final = 128
-
-
-class Leaves(Protocol):
-    """n convex leaves of patches, such as a radiosity field has."""
-
-    @property
-    def corners(self) -> Corners:
-        """(n, 4, 3) metres, counter-clockwise from the front; a triangle repeats its last corner"""
-
-    @property
-    def corner_count(self) -> IntArray:
-        """(n,) 3 or 4"""
-
-    @property
-    def patch(self) -> IntArray:
-        """(n,)"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.grouping import settle, unite
 from solver.kernels import kernel
-from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
+from solver.types import BoolArray, FloatArray, IntArray, Points
 
 WELD: Final = 1e-7
 """Corners are one if they are no further apart than this times the scene's size; corners up to 7 times as
@@ -125,28 +126,6 @@ def _weld(points: Points) -> IntArray:
         unite(order, differs, label)
     settle(label)
     return label
-
-
-@kernel
-def unite(order: Int64Array, differs: BoolArray, label: IntArray) -> None:
-    """Union-find: rows that follow each other in `order` and do not differ are one group."""
-    for i in range(len(differs)):
-        if differs[i]:
-            continue
-        a = order[i]
-        b = order[i + 1]
-        while label[a] != a:
-            a = label[a]
-        while label[b] != b:
-            b = label[b]
-        label[max(a, b)] = min(a, b)
-
-
-@kernel
-def settle(label: IntArray) -> None:
-    """Every label becomes its root: labels never exceed their row's index."""
-    for i in range(len(label)):
-        label[i] = label[label[i]]
 
 
 @kernel

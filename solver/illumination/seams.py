@@ -18,9 +18,11 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.topology import Leaves, Topology
+from solver.illumination.cells import Leaves
+from solver.illumination.grouping import settle, unite
+from solver.illumination.topology import Topology
 from solver.kernels import inline_kernel, kernel
-from solver.types import BoolArray, Corners, FloatArray, Int64Array, IntArray, Points
+from solver.types import Corners, FloatArray, IntArray, Points
 
 _STEP: Final = 1e-6
 """Rounding step of directions, and of positions relative to the scene's size."""
@@ -87,31 +89,9 @@ def _group(values: FloatArray) -> IntArray:
         rounded = np.floor(values / _STEP + shift).astype(np.int64)
         order = np.lexsort(rounded.T)
         differs = np.any(rounded[order[1:]] != rounded[order[:-1]], axis=1)
-        _unite(order, differs, label)
-    _flatten(label)
+        unite(order, differs, label)
+    settle(label)
     return label
-
-
-@kernel
-def _unite(order: Int64Array, differs: BoolArray, label: IntArray) -> None:
-    """Union-find: rows that follow each other in `order` and do not differ are one group."""
-    for i in range(len(differs)):
-        if differs[i]:
-            continue
-        a = order[i]
-        b = order[i + 1]
-        while label[a] != a:
-            a = label[a]
-        while label[b] != b:
-            b = label[b]
-        label[max(a, b)] = min(a, b)
-
-
-@kernel
-def _flatten(label: IntArray) -> None:
-    """Every label becomes its root: labels never exceed their row's index."""
-    for i in range(len(label)):
-        label[i] = label[label[i]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.cells import Leaves
 from solver.illumination.seams import BorderEdges, SeamLines, edges_on_lines
-from solver.illumination.topology import Leaves, Topology
+from solver.illumination.topology import Topology
 from solver.kernels import kernel
 from solver.types import FloatArray, IntArray, Points
 

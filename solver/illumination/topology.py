@@ -14,12 +14,13 @@ rounding, so any number of extra vertices, at any difference in size, is found.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
+from solver.illumination.cells import Leaves
 from solver.kernels import inline_kernel, kernel
-from solver.types import BoolArray, Corners, Int64Array, IntArray, Points
+from solver.types import BoolArray, Int64Array, IntArray, Points
 
 _STRAIGHT: Final = 2.0**-40
 """A vertex is on an edge if its distance from the edge is at most this times the greatest coordinate: what
@@ -27,25 +28,6 @@ rounding makes of a middle, thousands of times over, and less than the width of 
 
 _HASH: Final = -7046029254386353131
 """2^64 over the golden ratio, odd, as a signed number: Fibonacci hashing."""
-
-
-class Leaves(Protocol):
-    """n polygons that tile patches, such as the leaves of a radiosity field; vertices are bit-identical."""
-
-    @property
-    def corners(self) -> Corners:
-        """(n, 4, 3) metres, counter-clockwise from the front; a triangle repeats its last corner"""
-        ...
-
-    @property
-    def corner_count(self) -> IntArray:
-        """(n,) 3 or 4"""
-        ...
-
-    @property
-    def patch(self) -> IntArray:
-        """(n,) index into the surfaces' patches"""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ Work is a generator that yields about every few milliseconds, so that `step` can
 
 from __future__ import annotations
 
-import time
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -26,6 +25,7 @@ from solver.transport.pushpull import means
 from solver.transport.refine import choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
+from solver.transport.sliced import SlicedSolve
 from solver.transport.state import TransportState
 from solver.types import Spectra
 from solver.visibility.bvh import Hierarchy
@@ -73,7 +73,7 @@ class SolverStatistics:
     seconds: float
 
 
-class RadiositySolver:
+class RadiositySolver(SlicedSolve):
     """One radiosity solution in the making."""
 
     def __init__(
@@ -88,14 +88,7 @@ class RadiositySolver:
         `warm_start`: a solution of an earlier revision, whose mean radiosities of patches that still
         exist are where this one starts from.
         """
-        self.surfaces = surfaces
-        self.settings = settings
-        self.outcome = SolveOutcome.RUNNING
-        self.error_estimate = 1.0
-        self.unshot_fraction = 1.0
-        self.progress = 0.0
-        self.version = 0
-        """Counts the changes of the field."""
+        super().__init__(surfaces, settings)
         self._rays = rays
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
         self._pace = Pace()
@@ -105,19 +98,6 @@ class RadiositySolver:
             self._adopt(warm_start)
         self._ray_count = 0
         self._rounds = 0
-        self._seconds = 0.0
-        self._work = self._run()
-
-    def step(self, budget: float) -> bool:
-        """Work for about `budget` seconds; True while more remains."""
-        start = time.perf_counter()
-        while self.outcome is SolveOutcome.RUNNING:
-            if next(self._work, None) is None and self.outcome is SolveOutcome.RUNNING:
-                self.outcome = SolveOutcome.CONVERGED
-            if time.perf_counter() - start >= budget:
-                break
-        self._seconds += time.perf_counter() - start
-        return self.outcome is SolveOutcome.RUNNING
 
     @property
     def state(self) -> TransportState:
@@ -128,14 +108,6 @@ class RadiositySolver:
     def hierarchy(self) -> Hierarchy:
         """Of the patches that block."""
         return self._linker.hierarchy
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know about this solution."""
-        told = self.surfaces.warnings
-        if self.outcome not in (SolveOutcome.RUNNING, SolveOutcome.CONVERGED):
-            told = (*told, self.outcome.value)
-        return told
 
     def statistics(self) -> SolverStatistics:
         """Counts at this moment."""
@@ -225,7 +197,9 @@ class RadiositySolver:
                 self.outcome = choice
                 return
             yield True
-            for samples in refine(state, self._linker, self._pace, estimate.light, choice):
+            for number, samples in enumerate(refine(state, self._linker, self._pace, estimate.light, choice)):
+                # The leaves are others from the first slice on.
+                self.version += number == 0
                 self._ray_count += STRATA * samples
                 yield True
 

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from solver.illumination.visible_parts import PER_BLOCKER, ROOM, visible_factor
 from solver.types import Points, Vector
+from tests.illumination.visible_kernel import PER_BLOCKER, ROOM, visible_factor
 from tests.illumination.visible_twin import ON_PLANE, View, normal_of
 
 GUARD: Final = -7.25e77
