@@ -20,7 +20,7 @@ from benchmarks.timing import calls_per_second
 from solver.document.samples import load_sample
 from solver.engine.requests import CameraChoice
 from solver.geometry.surfaces import Surfaces, flatten
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.device import GlDevice
 from solver.rendering.meshes import DrawnMesh
 from solver.rendering.renderer import FrameRenderer, Layer, Shading

@@ -125,6 +125,7 @@ class Host:
             if value is None:
                 continue
             del self._waiting[number]
+            self._report()  # what an answer tells must not be ahead of the status
             self._end.send(Answer(number, value))
 
     def _work(self, engine: Engine) -> None:

@@ -14,7 +14,7 @@ from solver.engine.requests import Encoding, LayerName, NotAvailableError, Rende
 from solver.engine.world import World
 from solver.errors import RenderingUnavailableError
 from solver.geometry.scene import Camera
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.device import GlDevice
 from solver.rendering.encoding import PictureFormat, encode_linear, encode_picture
 from solver.rendering.layers import picture_of

@@ -20,16 +20,16 @@ from solver.engine.solution import Solution
 from solver.engine.status import FineStatistics
 from solver.errors import SolverError
 from solver.geometry.scene import Camera
-from solver.illumination.cells import Cells
-from solver.illumination.correction import corrected
-from solver.illumination.interpolants import Interpolants
-from solver.illumination.lines import Lines, find_lines
-from solver.illumination.mesh import InterpolantMesh
-from solver.illumination.point_irradiance import PointIrradiance
-from solver.illumination.refinement import ViewError, cells_to_split, view_error
+from solver.illumination.discontinuity.lines import Lines, find_lines
+from solver.illumination.interpolation.correction import corrected
+from solver.illumination.interpolation.interpolants import Interpolants
+from solver.illumination.interpolation.mesh import InterpolantMesh
+from solver.illumination.interpolation.refinement import ViewError, cells_to_split, view_error
+from solver.illumination.meshing.cells import Cells
+from solver.illumination.meshing.splitting import split_cells
+from solver.illumination.meshing.triangulation import Triangulation, triangulate
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
-from solver.illumination.splitting import split_cells
-from solver.illumination.triangulation import Triangulation, triangulate
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray, IntArray
 

@@ -16,7 +16,7 @@ from solver.engine.drawing import Drawing
 from solver.engine.requests import LayerName, RendererName
 from solver.engine.world import World
 from solver.geometry.scene import Camera
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.field import RadiosityField
 from solver.transport.pace import Pace
 from solver.types import FloatArray, IntArray

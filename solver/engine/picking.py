@@ -9,8 +9,8 @@ import numpy as np
 from solver.engine.drawing import Drawing
 from solver.engine.solution import Solution
 from solver.geometry.scene import Camera
-from solver.illumination.evaluate import evaluate_interpolants
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.evaluate import evaluate_interpolants
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.picking import Pick
 from solver.rendering.tessellation import RenderMesh
 from solver.types import LUMINANCE_WEIGHTS, Vector

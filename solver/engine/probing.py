@@ -7,7 +7,7 @@ import numpy as np
 from solver.engine.fine import FineLight
 from solver.engine.sampled import SampledSolver
 from solver.engine.solution import Solution
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
 from solver.types import FloatArray, Points
 

@@ -32,10 +32,10 @@ from solver.engine.requests import (
 )
 from solver.engine.world import World
 from solver.geometry.scene import Camera, Material, Mesh, Scene, SceneObject
-from solver.illumination.cells import Cells, ConstraintEdges
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.triangulation import triangulate
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
-from solver.illumination.triangulation import triangulate
 from solver.pathtracing import PathTracer
 from solver.rendering.encoding import LinearFormat, PictureFormat
 from solver.rendering.tessellation import Tessellator

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.scene import Camera
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.rendering.meshes import DrawnMesh, local_positions, triangle_patches

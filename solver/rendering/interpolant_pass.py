@@ -13,7 +13,7 @@ import moderngl
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.rendering.entry_points import Texel

@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.errors import SolverError
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.tessellation import RenderMesh
 from solver.types import FloatArray, IntArray, Points
 

@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.topology import Topology
+from solver.illumination.meshing.topology import Topology
 from solver.kernels import inline_kernel, kernel
 from solver.parallel import core_count, run_chunks
 from solver.transport.field import RadiosityField

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.errors import SceneError
 from solver.geometry.scene import Camera
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering import geometry_layers
 from solver.rendering.device import GlDevice
 from solver.rendering.false_colour import false_colour

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.seams import Seams, cut_borders, find_lines
-from solver.illumination.topology import Topology, connect
+from solver.illumination.meshing.seams import Seams, cut_borders, find_lines
+from solver.illumination.meshing.topology import Topology, connect
 from solver.kernels import inline_kernel, kernel
 from solver.rendering.middles import fill_middles
 from solver.rendering.reconstruction import vertex_irradiance

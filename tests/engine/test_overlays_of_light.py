@@ -20,7 +20,7 @@ from solver.engine.overlays.triangles import TriangulationOverlay
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName
 from solver.errors import LimitExceededError, SceneError
 from solver.geometry.surfaces import flatten
-from solver.illumination.samples import NUDGE
+from solver.illumination.interpolation.samples import NUDGE
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, AnyArray
 from tests.engine.acting import settle

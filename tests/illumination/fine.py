@@ -7,10 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.illumination.cells import Cells, ConstraintEdges
-from solver.illumination.interpolants import Interpolants
-from solver.illumination.point_irradiance import PointIrradiance
-from solver.illumination.triangulation import Triangulation, triangulate
+from solver.illumination.interpolation.interpolants import Interpolants
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.triangulation import Triangulation, triangulate
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from solver.geometry.scene import Material, Mesh, Scene, SceneObject
 from solver.geometry.surfaces import Surfaces, flatten
 from solver.geometry.transform import Transform
-from solver.illumination.discontinuities import Discontinuities, find_discontinuities
+from solver.illumination.discontinuity.discontinuities import Discontinuities, find_discontinuities
 from solver.types import FloatArray, IntArray, Points
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 

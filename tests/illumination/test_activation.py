@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from solver.document.samples import load_sample
 from solver.engine.world import World
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.activation import activate
-from solver.illumination.leaf_crossings import LeafCrossings, find_crossings
-from solver.illumination.sets import DiscontinuitySets, group_discontinuities
+from solver.illumination.discontinuity.activation import activate
+from solver.illumination.discontinuity.leaf_crossings import LeafCrossings, find_crossings
+from solver.illumination.discontinuity.sets import DiscontinuitySets, group_discontinuities
 from solver.transport.elements import ElementTree
 from solver.types import Corners, FloatArray, IntArray
 from tests.illumination.shadow_scenes import FLOOR, find, polygon, square, surfaces_of

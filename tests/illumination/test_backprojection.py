@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from solver.illumination.backprojection import Backprojection, backproject
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.points.backprojection import Backprojection, backproject
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.solve import RadiositySolver
 from solver.types import Points, Vector
 from tests.illumination.visible_twin import View, normal_of, source_region, visible_region

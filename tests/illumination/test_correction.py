@@ -7,8 +7,8 @@ import pytest
 
 from solver.document.samples import load_sample
 from solver.engine.world import World
-from solver.illumination.correction import corrected
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.interpolation.correction import corrected
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.pathtracing import PathTracer
 from solver.transport.solve import RadiositySolver
 from tests.illumination.fine import drain

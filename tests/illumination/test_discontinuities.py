@@ -10,16 +10,16 @@ import pytest
 from solver.document.samples import load_sample
 from solver.engine.world import World
 from solver.geometry.scene import Material, Mesh, SceneObject
-from solver.illumination.discontinuities import (
+from solver.illumination.discontinuity.discontinuities import (
     BEND,
     KINK,
     Discontinuities,
     find_discontinuities,
     find_shadow_lines,
 )
-from solver.illumination.outlines import find_outlines
-from solver.illumination.segments import CONTACT, EV, GRAZE, HORIZON, SHORTEST, VE
-from solver.illumination.silhouettes import is_silhouette
+from solver.illumination.discontinuity.outlines import find_outlines
+from solver.illumination.discontinuity.segments import CONTACT, EV, GRAZE, HORIZON, SHORTEST, VE
+from solver.illumination.discontinuity.silhouettes import is_silhouette
 from solver.transport.lambert import points_to_polygon
 from solver.types import FloatArray
 from tests.illumination.shadow_scenes import (

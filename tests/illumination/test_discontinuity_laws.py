@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 
 from solver.geometry.scene import Mesh, SceneObject
 from solver.geometry.transform import Transform
-from solver.illumination.discontinuities import Discontinuities, find_discontinuities
-from solver.illumination.outlines import find_outlines
-from solver.illumination.segments import EV, GRAZE, SHORTEST, VE, polygons_of, receiver_planes
-from solver.illumination.sets import ActiveEdges, group_discontinuities
-from solver.illumination.shadow_sight import free_parts, gather_spheres
-from solver.illumination.wedges import meet_receiver, wedge_normal
+from solver.illumination.discontinuity.discontinuities import Discontinuities, find_discontinuities
+from solver.illumination.discontinuity.outlines import find_outlines
+from solver.illumination.discontinuity.segments import EV, GRAZE, SHORTEST, VE, polygons_of, receiver_planes
+from solver.illumination.discontinuity.sets import ActiveEdges, group_discontinuities
+from solver.illumination.discontinuity.shadow_sight import free_parts, gather_spheres
+from solver.illumination.discontinuity.wedges import meet_receiver, wedge_normal
 from solver.types import FloatArray
 from solver.visibility.brute_force import blocking_margin
 from tests.illumination.shadow_scenes import (

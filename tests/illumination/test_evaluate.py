@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from solver.document.samples import load_sample
 from solver.geometry.surfaces import flatten
-from solver.illumination.evaluate import evaluate_interpolants
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.evaluate import evaluate_interpolants
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.types import Float32Array
 
 SURFACES = flatten(load_sample("cornell"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from solver.illumination.factor_lanes import (
+from solver.illumination.points.factor_lanes import (
     BLOCK,
     FACTOR,
     HIGHEST,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.illumination.fit import fit_interpolants
+from solver.illumination.interpolation.fit import fit_interpolants
 from solver.types import FloatArray, IntArray
 
 PLACES = np.array([[0, 0], [0.5, 0], [1, 0], [0.5, 0.5], [0, 1], [0, 0.5]])

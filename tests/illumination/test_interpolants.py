@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.illumination.cells import Cells, ConstraintEdges
-from solver.illumination.interpolants import Interpolants
-from solver.illumination.refinement import cells_to_split, view_error
-from solver.illumination.splitting import split_cells
-from solver.illumination.triangulation import triangulate
+from solver.illumination.interpolation.interpolants import Interpolants
+from solver.illumination.interpolation.refinement import cells_to_split, view_error
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.splitting import split_cells
+from solver.illumination.meshing.triangulation import triangulate
 from tests.illumination.fine import build_all, interpolants_of, relative_error
 from tests.transport.solving import furnace, shelf, solved
 

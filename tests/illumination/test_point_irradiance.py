@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from solver.document.samples import load_sample
 from solver.engine.world import World
 from solver.geometry.scene import Scene
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.pathtracing import PathTracer
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray, IntArray, Points

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.illumination.samples import NUDGE, place_samples
+from solver.illumination.interpolation.samples import NUDGE, place_samples
 from solver.types import FloatArray, IntArray
 from tests.illumination.fine import edge, triangulated
 from tests.transport.solving import shelf, solved

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from solver.document.samples import load_sample
 from solver.engine.world import World
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.discontinuities import Discontinuities
-from solver.illumination.segments import CONTACT, SAMPLES, VE
-from solver.illumination.sets import ActiveEdges, DiscontinuitySets, group_discontinuities
+from solver.illumination.discontinuity.discontinuities import Discontinuities
+from solver.illumination.discontinuity.segments import CONTACT, SAMPLES, VE
+from solver.illumination.discontinuity.sets import ActiveEdges, DiscontinuitySets, group_discontinuities
 from solver.types import BoolArray, FloatArray, IntArray
 from tests.illumination.shadow_scenes import FLOOR, find, polygon, square, surfaces_of
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from solver.geometry.scene import Mesh, SceneObject
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.cells import Cells, ConstraintEdges
-from solver.illumination.skeleton import MINIMUM_LENGTH
-from solver.illumination.triangulation import Triangulation, triangulate
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.skeleton import MINIMUM_LENGTH
+from solver.illumination.meshing.triangulation import Triangulation, triangulate
 from solver.transport.elements import ElementTree
 from solver.types import FloatArray
 from tests.illumination.triangles import (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.cells import Cells, ConstraintEdges
-from solver.illumination.skeleton import MINIMUM_LENGTH
-from solver.illumination.triangulation import Triangulation
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.skeleton import MINIMUM_LENGTH
+from solver.illumination.meshing.triangulation import Triangulation
 from solver.types import BoolArray, FloatArray, IntArray, Points, Vector
 from tests.rendering.fields import Split, build_field, even
 

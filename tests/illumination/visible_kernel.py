@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.illumination.cuts import PER_BLOCKER, ROOM, WHOLE, clip_above
-from solver.illumination.pyramids import PYRAMID, raise_pyramid
-from solver.illumination.visible_parts import clip_by_pyramids
+from solver.illumination.points.cuts import PER_BLOCKER, ROOM, WHOLE, clip_above
+from solver.illumination.points.pyramids import PYRAMID, raise_pyramid
+from solver.illumination.points.visible_parts import clip_by_pyramids
 from solver.kernels import kernel
 from solver.types import Corners, FloatArray, IntArray
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.geometry.scene import Camera
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.evaluate import evaluate_interpolants
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.evaluate import evaluate_interpolants
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.projection import FRONT, facings
 from solver.rendering.renderer import FrameRenderer, Layer, Shading
 from solver.rendering.tessellation import RenderMesh, Tessellator

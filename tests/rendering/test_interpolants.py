@@ -13,7 +13,7 @@ from solver.document.samples import load_sample
 from solver.errors import LimitExceededError
 from solver.geometry.scene import Camera
 from solver.geometry.surfaces import Surfaces, flatten
-from solver.illumination.mesh import InterpolantMesh
+from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.device import GlDevice
 from solver.rendering.meshes import NotInMeshError
 from solver.rendering.renderer import FrameRenderer, Layer, Shading, needs_interpolants

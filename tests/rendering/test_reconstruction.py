@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.topology import Topology, connect
+from solver.illumination.meshing.topology import Topology, connect
 from solver.rendering.reconstruction import vertex_irradiance
 from solver.rendering.tessellation import Tessellator
 from solver.transport.field import RadiosityField

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from solver.geometry.scene import SceneObject
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.topology import connect
+from solver.illumination.meshing.topology import connect
 from solver.rendering.tessellation import RenderMesh, Tessellator
 from solver.types import FloatArray, IntArray
 from tests.rendering.fields import (

@@ -7,7 +7,7 @@ import pytest
 
 from solver.geometry.scene import Camera, Mesh, SceneObject
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.topology import connect
+from solver.illumination.meshing.topology import connect
 from solver.rendering.geometry_layers import rays
 from solver.rendering.renderer import FrameRenderer, Layer, Shading
 from solver.rendering.tessellation import RenderMesh, Tessellator

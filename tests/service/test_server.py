@@ -201,9 +201,9 @@ def test_a_client_that_hangs_up_leaves_nothing_behind(service: Service) -> None:
 
 def test_a_worker_that_dies_takes_one_session_with_it(service: Service) -> None:
     assert eventually(lambda: "halflight_warm_workers 1.0" in service.http.get("/metrics").text)
-    before = service.workers()
+    assert eventually(lambda: len(service.workers()) == 1)
+    (worker,) = service.workers()
     lost = service.open(ENDLESS)
-    (worker,) = (pid for pid in before if pid in service.workers())
     kept = service.open(LOOSE)
     answers: list[httpx.Response] = []
     query = {"wait": "converged"}

@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.engine.world import World
 from solver.geometry.scene import Mesh, Scene, SceneObject
-from solver.illumination.correction import corrected
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.interpolation.correction import corrected
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 from solver.transport.state import TransportState

@@ -13,7 +13,7 @@ from solver.engine.overlays.partition import part_source
 from solver.engine.overlays.places import Address, Place
 from solver.engine.overlays.shapes import GREEN, VIOLET, WHITE, Primitives, Shapes
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.backprojection import Backprojection, backproject
+from solver.illumination.points.backprojection import Backprojection, backproject
 from solver.transport.elements import plane_axes
 from solver.types import FloatArray, IntArray, Points
 from solver.visibility.bvh import build_hierarchy

@@ -23,8 +23,8 @@ from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.errors import SceneError, SolverError
 from solver.geometry.scene import Camera
-from solver.illumination.interpolants import Interpolants
-from solver.illumination.point_irradiance import PointIrradiance
+from solver.illumination.interpolation.interpolants import Interpolants
+from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.types import AnyArray, IntArray, Spectra
 
 DEFAULT_LIMIT: Final = 20_000

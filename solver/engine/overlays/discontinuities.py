@@ -20,7 +20,7 @@ from solver.engine.overlays.base import (
     still_missing,
 )
 from solver.engine.overlays.shapes import VIOLET, Primitives, Shapes
-from solver.illumination.discontinuities import KINDS
+from solver.illumination.discontinuity.discontinuities import KINDS
 
 
 class Activity(StrEnum):

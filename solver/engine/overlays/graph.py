@@ -14,8 +14,8 @@ from solver.engine.overlays.heights import height_scale, lifted
 from solver.engine.overlays.selection import EVERYTHING, Selection
 from solver.engine.overlays.shapes import BLUE, RED, WHITE, Primitives, Shapes
 from solver.errors import LimitExceededError, SceneError
-from solver.illumination.evaluate import evaluate_interpolants
-from solver.illumination.samples import NUDGE
+from solver.illumination.interpolation.evaluate import evaluate_interpolants
+from solver.illumination.interpolation.samples import NUDGE
 from solver.transport.pace import Pace
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Points, Spectra
 

@@ -11,7 +11,7 @@ from solver.engine.overlays.base import Needs, Overlay, Shown, Subject, Work, to
 from solver.engine.overlays.heights import height_scale, lifted
 from solver.engine.overlays.places import Address
 from solver.engine.overlays.shapes import WHITE, Primitives, Shapes
-from solver.illumination.evaluate import evaluate_interpolants
+from solver.illumination.interpolation.evaluate import evaluate_interpolants
 from solver.types import LUMINANCE_WEIGHTS
 
 

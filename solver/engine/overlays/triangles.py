@@ -10,7 +10,7 @@ import numpy as np
 from solver.engine.overlays.base import FIRST_PAGE, Needs, Overlay, Page, Shown, Subject, Work, or_none
 from solver.engine.overlays.selection import EVERYTHING, Selection
 from solver.engine.overlays.shapes import GREEN, VIOLET, Primitives, Shapes
-from solver.illumination.triangulation import Triangulation
+from solver.illumination.meshing.triangulation import Triangulation
 from solver.types import IntArray
 
 

@@ -1,0 +1,1 @@
+"""Leaves cut into conforming triangles along discontinuities."""

@@ -1,0 +1,123 @@
+"""Triangles that tile the cells of patches and have edges along discontinuities ([H 3.6], 5.5.2, 5.5.8).
+
+Triangulations are conforming, in all three cases of [H 3.6]: neighbouring cells share their vertices
+whatever their sizes (A), a discontinuity that ends on or crosses an edge is a vertex of both sides (B), and
+where borders of patches run along each other all have the same vertices there (C, which [H] leaves open).
+
+The steps, none of them a loop over cells or edges:
+
+1. `skeleton`: the cells' outlines, cut at all vertices of any neighbour; pieces in one place share a rail;
+2. `crossings`: where constraint edges meet rails, which get points there, and the chords within cells;
+3. `arrangement`: chords in each cell become a plane graph;
+4. `linework`: all nodes and edges, numbered patch by patch;
+5. `delaunay`: triangles of the patches whose linework is not what it was.
+
+The alternative, to snap all lines of a patch to one grid, moves the edges of cells; here they stay as they
+are to the last bit, only discontinuities move, by some thousandths of a cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
+from solver.illumination.meshing.arrangement import arrange
+from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.crossings import find_chords
+from solver.illumination.meshing.delaunay import triangulate_cells
+from solver.illumination.meshing.linework import Linework, draw_lines
+from solver.illumination.meshing.patch_triangles import PatchTriangles, connect_triangles, keep_triangles
+from solver.illumination.meshing.skeleton import build_skeleton
+from solver.types import BoolArray, IntArray, Points
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulation:
+    """t triangles over v vertices, both sorted by patch; edge k runs from corner k to the next."""
+
+    position: Points
+    """(v, 3) metres; where borders of patches meet, bit-identical but for their own corners' rounding"""
+    vertex_patch: IntArray
+    """(v,) patches share no vertices"""
+    vertex_start: IntArray
+    """(p + 1,) where each patch's vertices begin"""
+    triangles: IntArray
+    """(t, 3) vertices, counter-clockwise from the front; none has no area"""
+    triangle_start: IntArray
+    """(p + 1,) where each patch's triangles begin"""
+    patch: IntArray
+    """(t,)"""
+    cell: IntArray
+    """(t,) cell that a triangle lies in"""
+    leaf: IntArray
+    """(t,) what that cell is known by"""
+    edge_set: IntArray
+    """(t, 3) set of discontinuities that an edge lies on, or -1; of several, one with a jump if any has"""
+    edge_jump: BoolArray
+    """(t, 3) whether irradiance jumps at the edge"""
+    neighbour: IntArray
+    """(t, 3) triangle of the same patch across an edge, or -1 on the patch's border"""
+    rebuilt: int
+    """Patches that were triangulated; the others have the triangles of the triangulation before"""
+    unresolved: IntArray
+    """Cells in which some constraint edges were left out, since their lines did not come to rest"""
+    linework: Linework
+    """What the triangles follow from"""
+    parts: PatchTriangles
+    """The same triangles, in each patch's own numbers"""
+
+
+def triangulate(
+    cells: Cells,
+    surfaces: Surfaces,
+    edges: ConstraintEdges,
+    previous: Triangulation | None = None,
+    middles: bool = True,
+) -> Triangulation:
+    """Triangles that tile `cells`, with edges along all `edges`.
+
+    What of an edge is nearer than `skeleton.MINIMUM_LENGTH`, times the width of the cell, to a vertex or to
+    an edge of cells is moved there. A patch that is as it was in `previous`, the vertices on its border
+    included, keeps its triangles, in their order. With `middles`, a cell that several smaller neighbours
+    touch gets a vertex in its middle: more triangles, but fewer that are long and thin.
+
+    Raises ValueError for edges that are not finite or not on a patch, TriangulationError where triangles do
+    not tile their cell.
+    """
+    p = surfaces.patch_count
+    if not np.all((edges.patch >= 0) & (edges.patch < p)):
+        raise ValueError(f"constraint edges must lie on patches 0 to {p - 1}")
+    if not np.all(np.isfinite(edges.ends)):
+        raise ValueError("constraint edges must have finite ends")
+    order = np.argsort(cells.patch, kind="stable").astype(np.int32)
+    cells = Cells(cells.corners[order], cells.corner_count[order], cells.patch[order], cells.leaf[order])
+    edges = edges.take(np.argsort(~edges.jump, kind="stable").astype(np.int32))
+    skeleton = build_skeleton(cells, surfaces)
+    chords, points = find_chords(cells, surfaces, edges, skeleton)
+    arrangement, rings = arrange(chords, points, edges, skeleton)
+    lines = draw_lines(cells, edges, skeleton, rings, arrangement, p, middles)
+    kept = np.zeros(p, dtype=np.bool_) if previous is None else lines.same_patches(previous.linework)
+    made = connect_triangles(triangulate_cells(lines, ~kept, surfaces.normal, skeleton), lines)
+    if previous is not None:
+        made = keep_triangles(made, previous.parts, kept)
+    patch = made.patch
+    cell = made.cell + lines.cell_start[patch]
+    return Triangulation(
+        position=lines.position,
+        vertex_patch=np.repeat(np.arange(p, dtype=np.int32), np.diff(lines.node_start)),
+        vertex_start=lines.node_start,
+        triangles=made.triangles + lines.node_start[patch][:, None],
+        triangle_start=made.start,
+        patch=patch,
+        cell=order[cell],
+        leaf=cells.leaf[cell],
+        edge_set=made.edge_set,
+        edge_jump=made.edge_jump,
+        neighbour=np.where(made.neighbour < 0, np.int32(-1), made.neighbour + made.start[patch][:, None]),
+        rebuilt=int(np.count_nonzero(~kept)),
+        unresolved=order[np.unique(arrangement.dropped)],
+        linework=lines,
+        parts=made,
+    )

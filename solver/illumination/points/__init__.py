@@ -1,0 +1,1 @@
+"""Irradiance at points: what a point sees of every source, exactly."""
