@@ -5,6 +5,7 @@ Every error is a SceneError whose location is the path of the offending field in
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -51,7 +52,7 @@ def object_of(document: ObjectDocument, where: Location = ()) -> SceneObject:
     placed = SceneObject(
         id=document.id,
         mesh=mesh_of(document.mesh, (*where, "mesh")),
-        material=material_of(document.material),
+        material=material_of(document.material, (*where, "material")),
         transform=transform_of(document.transform),
     )
     require_in_bounds(placed, (*where, "transform"))
@@ -76,9 +77,22 @@ def _refuse_index(faces: tuple[tuple[int, ...], ...], count: int, where: Locatio
     )
 
 
-def material_of(document: MaterialDocument) -> Material:
-    """The material that `document` describes."""
-    return Material(np.array(document.reflectance), np.array(document.emission), document.two_sided)
+def material_of(document: MaterialDocument, where: Location = ()) -> Material:
+    """The material that `document` describes. Raises SceneError where it would reflect all light, or more."""
+    for channel, (diffuse, specular) in enumerate(zip(document.reflectance, document.specular, strict=True)):
+        if diffuse + specular >= 1.0:
+            raise SceneError(
+                f"reflectance + specular must be below 1, and {diffuse:g} + {specular:g} is not",
+                (*where, "specular", channel),
+            )
+    return Material(
+        reflectance=np.array(document.reflectance),
+        emission=np.array(document.emission),
+        two_sided=document.two_sided,
+        specular=np.array(document.specular),
+        exponent=math.inf if document.exponent is None else document.exponent,
+        emission_exponent=document.emission_exponent,
+    )
 
 
 def transform_of(document: TransformDocument) -> Transform:
@@ -149,12 +163,19 @@ def _object_document(source: SceneObject) -> ObjectDocument:
         mesh=MeshDocument(
             vertices=source.mesh.vertices.tolist(), faces=[list(face) for face in source.mesh.faces]
         ),
-        material=MaterialDocument(
-            reflectance=source.material.reflectance.tolist(),
-            emission=source.material.emission.tolist(),
-            two_sided=source.material.two_sided,
-        ),
+        material=_material_document(source.material),
         transform=_transform_document(source.transform),
+    )
+
+
+def _material_document(source: Material) -> MaterialDocument:
+    return MaterialDocument(
+        reflectance=source.reflectance.tolist(),
+        emission=source.emission.tolist(),
+        specular=source.specular.tolist(),
+        exponent=None if math.isinf(source.exponent) else source.exponent,
+        emission_exponent=source.emission_exponent,
+        two_sided=source.two_sided,
     )
 
 

@@ -100,7 +100,7 @@ def _changed(
             require_in_bounds(moved, (*where, "transform"))
             return moved
         case SetMaterialEdit():
-            return replace(before, material=material_of(edit.material))
+            return replace(before, material=material_of(edit.material, (*where, "material")))
         case SetMeshEdit():
             reshaped = replace(before, mesh=mesh_of(edit.mesh, (*where, "mesh")))
             require_in_bounds(reshaped, (*where, "mesh", "vertices"))

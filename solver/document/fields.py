@@ -24,6 +24,9 @@ LEAST_LENGTH: Final = 1e-100
 LEAST_FIELD_OF_VIEW: Final = 1e-3
 """Degrees: 17 mm seen from a kilometre."""
 
+MAX_EXPONENT: Final = 1e6
+"""Of a power of a cosine: half of the light is then within a fifteenth of a degree."""
+
 MAX_FACE_CORNERS: Final = 4096
 
 _LEAST_DETERMINANT: Final = 1e-12
@@ -84,6 +87,8 @@ Emission: TypeAlias = Annotated[
     list[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=MAX_EMISSION)]],
     Field(min_length=3, max_length=3),
 ]
+Exponent: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=MAX_EXPONENT)]
+"""The power of a cosine: 0 spreads light over a hemisphere, large ones hold it together."""
 Quaternion: TypeAlias = Annotated[
     list[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]],
     Field(min_length=4, max_length=4),

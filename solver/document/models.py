@@ -13,6 +13,7 @@ from solver.document.fields import (
     Closed,
     Direction,
     Emission,
+    Exponent,
     Extent,
     Face,
     FieldOfView,
@@ -42,13 +43,31 @@ class MeshDocument(Closed):
 
 
 class MaterialDocument(Closed):
-    """A diffuse surface. Triples are linear RGB with sRGB/Rec.709 primaries."""
+    """A surface: diffuse, and specular where it says so. Triples are linear RGB with sRGB/Rec.709 primaries.
+
+    In each channel, reflectance + specular is below 1.
+    """
 
     reflectance: Reflectance = Field(
         default=[0.5, 0.5, 0.5], description="Hemispherical diffuse reflectance, each channel in [0, 1)."
     )
     emission: Emission = Field(
         default=[0.0, 0.0, 0.0], description="Emitted radiant exitance in W/m2 per channel."
+    )
+    specular: Reflectance = Field(
+        default=[0.0, 0.0, 0.0],
+        description="Hemispherical specular reflectance, each channel in [0, 1); with the reflectance of the "
+        "channel, below 1.",
+    )
+    exponent: Exponent | None = Field(
+        default=None,
+        description="Phong exponent n of specular reflection, a lobe about the mirrored direction, or null for a "
+        "perfect mirror. A lobe reflects less the more light grazes the surface.",
+    )
+    emission_exponent: Exponent = Field(
+        default=0.0,
+        description="Exponent d of directional emission: radiance goes with cos^d of the angle to the normal, at "
+        "the same radiant exitance. 0 is diffuse emission.",
     )
     two_sided: bool = Field(
         default=False,

@@ -6,6 +6,7 @@ be compared object by object at no cost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +20,7 @@ from solver.types import FloatArray, ObjectId, Points, Vector
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A diffuse surface."""
+    """What a surface makes of light: diffuse, and specular where it says so."""
 
     reflectance: Vector
     """(3,) hemispherical diffuse reflectance, each in [0, 1)."""
@@ -27,6 +28,12 @@ class Material:
     """(3,) emitted radiant exitance in W/m2."""
     two_sided: bool = False
     """Whether the back reflects and emits too; otherwise it is black."""
+    specular: Vector = field(default_factory=lambda: np.zeros(3))
+    """(3,) hemispherical specular reflectance, each in [0, 1), and below 1 with `reflectance`."""
+    exponent: float = math.inf
+    """Phong exponent of the lobe that specular reflection goes into; infinite for a perfect mirror."""
+    emission_exponent: float = 0.0
+    """d of emitted radiance that goes with cos^d of the angle to the normal; 0 is diffuse."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,12 @@ class Surfaces:
     """(p, 3)"""
     emission: FloatArray
     """(p, 3) W/m2"""
+    specular: FloatArray
+    """(p, 3) hemispherical specular reflectance"""
+    exponent: FloatArray
+    """(p,) of the Phong lobe of specular reflection, infinite for a perfect mirror"""
+    emission_exponent: FloatArray
+    """(p,) d of emitted radiance that goes with cos^d of the angle to the normal"""
     triangles: FloatArray
     """(t, 3, 3) opaque triangles, each face once"""
     triangle_patch: IntArray
@@ -59,11 +65,19 @@ class Surfaces:
 
     @property
     def is_grey(self) -> bool:
-        """Whether one channel tells all: reflectance and emission are equal over R, G and B."""
-        return bool(
-            np.all(self.reflectance == self.reflectance[:, :1])
-            and np.all(self.emission == self.emission[:, :1])
-        )
+        """Whether one channel tells all: reflectances and emission are equal over R, G and B."""
+        triples = (self.reflectance, self.emission, self.specular)
+        return all(bool(np.all(triple == triple[:, :1])) for triple in triples)
+
+    @property
+    def has_specular(self) -> bool:
+        """Whether anything reflects specularly."""
+        return bool(self.specular.any())
+
+    @property
+    def has_directional_emission(self) -> bool:
+        """Whether anything emits otherwise than diffusely."""
+        return bool(np.any(self.emission.any(axis=1) & (self.emission_exponent > 0.0)))
 
 
 def flatten(scene: Scene) -> Surfaces:
@@ -84,6 +98,9 @@ def flatten(scene: Scene) -> Surfaces:
         side=_join_ids([part.side for part in parts]),
         reflectance=_join([part.reflectance for part in parts], (0, 3)),
         emission=_join([part.emission for part in parts], (0, 3)),
+        specular=_join([part.specular for part in parts], (0, 3)),
+        exponent=_join([part.exponent for part in parts], (0,)),
+        emission_exponent=_join([part.emission_exponent for part in parts], (0,)),
         triangles=_join([part.triangles for part in parts], (0, 3, 3)),
         triangle_patch=np.concatenate(
             [
@@ -122,6 +139,9 @@ class _Part:
     side: IntArray
     reflectance: FloatArray
     emission: FloatArray
+    specular: FloatArray
+    exponent: FloatArray
+    emission_exponent: FloatArray
     triangles: FloatArray
     triangle_patch: IntArray
     face_count: int
@@ -163,6 +183,9 @@ def _flatten_object(source: SceneObject, index: int, scene_size: float) -> _Part
         side=side,
         reflectance=np.tile(source.material.reflectance, (total, 1)),
         emission=np.tile(source.material.emission, (total, 1)),
+        specular=np.tile(source.material.specular, (total, 1)),
+        exponent=np.full(total, source.material.exponent),
+        emission_exponent=np.full(total, source.material.emission_exponent),
         triangles=triangles,
         triangle_patch=np.stack([owner, back], axis=-1),
         face_count=len(faces) - len(split.dropped),

@@ -82,6 +82,14 @@ BAD: list[tuple[dict[str, Any], tuple[str | int, ...]]] = [
         ("edits", 1, "mesh", "faces", 0, 2),
     ),
     (
+        {"op": "set_material", "id": "a", "material": {"reflectance": [0, 0, 0.5], "specular": [0, 0, 0.5]}},
+        ("edits", 1, "material", "specular", 2),
+    ),
+    (
+        {"op": "add", "object": {"id": "d", "mesh": TRIANGLE, "material": {"specular": [0.6, 0, 0]}}},
+        ("edits", 1, "object", "material", "specular", 0),
+    ),
+    (
         {"op": "move", "id": "a", "transform": {"translation": [1e9, 0, 0], "scale": 9}},
         ("edits", 1, "transform"),
     ),

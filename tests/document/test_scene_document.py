@@ -56,6 +56,9 @@ def assert_same(a: Scene, b: Scene) -> None:
         assert np.array_equal(one.material.reflectance, other.material.reflectance)
         assert np.array_equal(one.material.emission, other.material.emission)
         assert one.material.two_sided is other.material.two_sided
+        assert np.array_equal(one.material.specular, other.material.specular)
+        assert one.material.exponent == other.material.exponent
+        assert one.material.emission_exponent == other.material.emission_exponent
     assert list(a.cameras) == list(b.cameras)
     for name, camera in a.cameras.items():
         twin = b.cameras[name]
@@ -97,6 +100,18 @@ def assert_same(a: Scene, b: Scene) -> None:
         (scene_with(material={"emission": [0, 0, -1]}), ("objects", 0, "material", "emission", 2)),
         (scene_with(material={"emission": [0, 0, math.inf]}), ("objects", 0, "material", "emission", 2)),
         (scene_with(material={"two_sided": 1}), ("objects", 0, "material", "two_sided")),
+        (scene_with(material={"specular": [0, 0, -0.1]}), ("objects", 0, "material", "specular", 2)),
+        (scene_with(material={"specular": 0.1}), ("objects", 0, "material", "specular")),
+        (scene_with(material={"exponent": -1}), ("objects", 0, "material", "exponent")),
+        (scene_with(material={"exponent": 1e7}), ("objects", 0, "material", "exponent")),
+        (scene_with(material={"exponent": math.inf}), ("objects", 0, "material", "exponent")),
+        (scene_with(material={"emission_exponent": -1}), ("objects", 0, "material", "emission_exponent")),
+        (scene_with(material={"emission_exponent": None}), ("objects", 0, "material", "emission_exponent")),
+        (
+            scene_with(material={"reflectance": [0.2, 0.75, 0.8], "specular": [0.3, 0.25, 0.3]}),
+            ("objects", 0, "material", "specular", 1),
+        ),
+        (scene_with(material={"specular": [0, 0.5, 0]}), ("objects", 0, "material", "specular", 1)),
         (scene_with(transform={"rotation": [0, 0, 0, 0]}), ("objects", 0, "transform", "rotation")),
         (scene_with(transform={"rotation": [0, 0, 1]}), ("objects", 0, "transform", "rotation")),
         (scene_with(transform={"scale": 0}), ("objects", 0, "transform", "scale")),
@@ -162,19 +177,37 @@ quaternions = st.tuples(finite, finite, finite, finite).filter(lambda q: any(abs
 factors = st.floats(0.01, 100) | st.floats(-100, -0.01)
 
 
-@given(triples, quaternions, st.tuples(factors, factors, factors), st.floats(0, 0.999), st.booleans())
+@given(
+    triples,
+    quaternions,
+    st.tuples(factors, factors, factors),
+    st.floats(0, 0.999),
+    st.booleans(),
+    st.none() | st.floats(0, 1e6),
+    st.floats(0, 1e6),
+)
 def test_any_object_comes_back_as_it_was(
     translation: tuple[float, ...],
     rotation: tuple[float, ...],
     scale: tuple[float, ...],
     reflectance: float,
     two_sided: bool,
+    exponent: float | None,
+    emission_exponent: float,
 ) -> None:
+    material = {
+        "reflectance": [reflectance] * 3,
+        "emission": [1, 2, 3],
+        "two_sided": two_sided,
+        "specular": [0.9 * (1.0 - reflectance), 0.0, 0.0],
+        "exponent": exponent,
+        "emission_exponent": emission_exponent,
+    }
     scene = read(
         {"cameras": {"c": {"eye": [9, 9, 9]}}}
         | scene_with(
             transform={"translation": translation, "rotation": rotation, "scale": scale},
-            material={"reflectance": [reflectance] * 3, "emission": [1, 2, 3], "two_sided": two_sided},
+            material=material,
         )
     )
     assert_same(there_and_back(scene), scene)
@@ -196,7 +229,18 @@ def test_what_is_not_given_has_a_default() -> None:
     assert np.array_equal(square.transform.matrix, np.eye(4))
     assert not square.material.emission.any()
     assert not square.material.two_sided
+    assert not square.material.specular.any()
+    assert square.material.emission_exponent == 0.0
     assert list(scene.cameras) == ["main"]
+
+
+def test_specular_reflection_without_an_exponent_is_a_mirror_s() -> None:
+    def exponent(**material: Any) -> float:
+        scene = read(scene_with(material={"reflectance": [0, 0, 0], "specular": [0.5] * 3, **material}))
+        return scene.object("a").material.exponent
+
+    assert exponent() == exponent(exponent=None) == math.inf
+    assert exponent(exponent=0) == 0.0 and exponent(exponent=20) == 20.0
 
 
 def test_the_default_camera_sees_the_front_of_a_lone_square() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -54,6 +55,27 @@ def test_one_sided_faces() -> None:
     assert not s.side.any()
     assert np.all(s.triangle_patch[:, 1] == -1), "backs are black"
     assert s.warnings == ()
+
+
+def test_patches_have_the_lobes_of_their_material() -> None:
+    plain = flattened(thing("a", SQUARE, CONCAVE))
+    assert not plain.specular.any() and not plain.emission_exponent.any()
+    assert not plain.has_specular and not plain.has_directional_emission
+    gloss = Material(
+        np.zeros(3),
+        np.zeros(3),
+        two_sided=True,
+        specular=np.array([0.1, 0.2, 0.3]),
+        exponent=20.0,
+        emission_exponent=4.0,
+    )
+    s = flattened(thing("a", SQUARE), replace(thing("b", CONCAVE), material=gloss))
+    np.testing.assert_array_equal(s.specular[1:], np.tile([0.1, 0.2, 0.3], (8, 1)))
+    assert s.exponent.tolist() == [np.inf] + [20.0] * 8
+    assert s.emission_exponent.tolist() == [0.0] + [4.0] * 8
+    assert s.has_specular and not s.has_directional_emission, "nothing emits"
+    lit = flattened(replace(thing("b", SQUARE), material=replace(gloss, emission=np.array([0.0, 1.0, 0.0]))))
+    assert lit.has_directional_emission
 
 
 def test_two_sided_faces_come_twice_and_block_once() -> None:
@@ -166,3 +188,8 @@ def test_a_scene_is_grey_if_all_of_it_is(
 ) -> None:
     s = flattened(thing("a", SQUARE), thing("b", SQUARE, reflectance=reflectance, emission=emission))
     assert s.is_grey == grey
+
+
+def test_specular_colours_count_where_a_scene_is_grey() -> None:
+    tinted = Material(np.zeros(3), np.zeros(3), specular=np.array([0.1, 0.1, 0.2]))
+    assert not flattened(replace(thing("a", SQUARE), material=tinted)).is_grey

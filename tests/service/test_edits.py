@@ -94,6 +94,14 @@ BAD: list[tuple[object, list[str | int]]] = [
         ["body", "edits", 1, "material", "reflectance", 2],
     ),
     (
+        of({"op": "set_material", "id": "crate", "material": {"specular": [0.3, 0.5, 0.3]}}),
+        ["body", "edits", 1, "material", "specular", 1],
+    ),
+    (
+        of({"op": "set_material", "id": "crate", "material": {"exponent": "mirror"}}),
+        ["body", "edits", 1, "material", "exponent"],
+    ),
+    (
         of({"op": "set_mesh", "id": "crate", "mesh": {"vertices": [], "faces": [[0, 1, 2]]}}),
         ["body", "edits", 1, "mesh", "faces", 0, 0],
     ),
