@@ -61,13 +61,13 @@ class MaterialDocument(Closed):
     )
     exponent: Exponent | None = Field(
         default=None,
-        description="Phong exponent n of specular reflection, a lobe about the mirrored direction, or null for a "
-        "perfect mirror. A lobe reflects less the more light grazes the surface.",
+        description="Phong exponent n of specular reflection, a lobe about the mirrored direction, or null "
+        "for a perfect mirror. A lobe reflects less the more light grazes the surface.",
     )
     emission_exponent: Exponent = Field(
         default=0.0,
-        description="Exponent d of directional emission: radiance goes with cos^d of the angle to the normal, at "
-        "the same radiant exitance. 0 is diffuse emission.",
+        description="Exponent d of directional emission: radiance goes with cos^d of the angle to the "
+        "normal, at the same radiant exitance. 0 is diffuse emission.",
     )
     two_sided: bool = Field(
         default=False,
