@@ -21,6 +21,7 @@ from solver.rendering.meshes import DrawnMesh, NotInMeshError
 from solver.rendering.passes import BACK, AccumulationPass, FlatPass, GouraudPass, IdentityPass, Viewpoint
 from solver.rendering.picking import Pick
 from solver.rendering.projection import Projection, pixel_pattern
+from solver.rendering.surface_points import SurfacePoints, surface_points
 from solver.rendering.targets import Pixel, Target, Targets, require_drawable
 from solver.types import LUMINANCE_WEIGHTS, AnyArray, BoolArray, Float32Array, IntArray
 
@@ -97,11 +98,29 @@ class FrameRenderer:
                     illuminance = irradiance @ LUMINANCE_WEIGHTS.astype(np.float32)
                     return illuminance if layer is Layer.ILLUMINANCE else false_colour(illuminance)
                 case Layer.ERROR if isinstance(mesh, InterpolantMesh):
-                    shown, is_back = self._draw_identity(scene, camera)
+                    shown, is_back = self._draw_identity(scene, *_middles(mesh, camera))
                     return geometry_layers.errors(np.where(is_back, np.int32(-1), shown), mesh)
                 case _:
-                    shown, _ = self._draw_identity(scene, camera)
+                    shown, _ = self._draw_identity(scene, *_middles(mesh, camera))
                     return _geometry(shown, mesh, camera, layer)
+
+    def surface_points(
+        self, mesh: DrawnMesh, camera: Camera, offset: tuple[float, float] = (0.0, 0.0)
+    ) -> SurfacePoints:
+        """The points on fronts of patches that pixels of `camera` show.
+
+        `offset` is how far right and down of a pixel's centre its point lies, in pixels. Raises as `draw`.
+        """
+        require_drawable(camera, 1, self._device)
+        size = (camera.width, camera.height)
+        jitter = (-2.0 * offset[0] / camera.width, -2.0 * offset[1] / camera.height)
+        projection = Projection.of(camera, mesh.surfaces)
+        with self._device.current():
+            shown, is_back = self._draw_identity(
+                self._hold(mesh), Viewpoint(camera.eye, projection, jitter), size
+            )
+        patch = geometry_layers.patches(np.where(is_back, np.int32(-1), shown), mesh)
+        return surface_points(patch, mesh.surfaces, projection.eye, projection.rays(size, jitter))
 
     def pick(self, mesh: DrawnMesh, camera: Camera, x: int, y: int) -> Pick | None:
         """What the pixel in column `x` and row `y` shows, both counted from the top left; None for nothing.
@@ -113,7 +132,7 @@ class FrameRenderer:
             if not 0 <= at < length:
                 raise SceneError(f"a pixel of this frame is in 0 to {length - 1}", (name,))
         with self._device.current():
-            shown, _ = self._draw_identity(self._hold(mesh), camera, (x, y, 1, 1))
+            shown, _ = self._draw_identity(self._hold(mesh), *_middles(mesh, camera), (x, y, 1, 1))
         triangle = int(shown[0, 0])
         if triangle < 0:
             return None
@@ -188,18 +207,27 @@ class FrameRenderer:
         return lambda viewpoint, target: self._gouraud.draw(scene, viewpoint, target, name, values)
 
     def _draw_identity(
-        self, scene: GpuMesh, camera: Camera, piece: tuple[int, int, int, int] | None = None
+        self,
+        scene: GpuMesh,
+        viewpoint: Viewpoint,
+        size: tuple[int, int],
+        piece: tuple[int, int, int, int] | None = None,
     ) -> tuple[IntArray, BoolArray]:
         """Triangle that each pixel shows, (h, w), or -1, and whether its back.
 
         Of the whole frame, or of the `piece` from a column and a row on, so many wide and high.
         """
-        target = self._targets.get((camera.width, camera.height), Pixel.IDENTITY)
-        self._identity.draw(scene, Viewpoint(camera.eye, Projection.of(camera, scene.mesh.surfaces)), target)
-        window = piece or (0, 0, camera.width, camera.height)
+        target = self._targets.get(size, Pixel.IDENTITY)
+        self._identity.draw(scene, viewpoint, target)
+        window = piece or (0, 0, *size)
         shown = np.empty((window[3], window[2]), dtype=np.uint32)
         target.framebuffer.read_into(shown, window, 1, dtype=Pixel.IDENTITY.value, alignment=4)
         return ((shown & ~BACK) - np.uint32(1)).view(np.int32), (shown & BACK) != 0
+
+
+def _middles(mesh: DrawnMesh, camera: Camera) -> tuple[Viewpoint, tuple[int, int]]:
+    """`camera` looking through the centres of its pixels, and the size of its frames."""
+    return Viewpoint(camera.eye, Projection.of(camera, mesh.surfaces)), (camera.width, camera.height)
 
 
 def _geometry(shown: IntArray, mesh: DrawnMesh, camera: Camera, layer: Layer) -> AnyArray:

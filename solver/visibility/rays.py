@@ -19,6 +19,7 @@ from solver.parallel import run_chunks
 from solver.types import BoolArray, Float32Array, FloatArray, IntArray, Points, Vector
 
 _LEAST: Final = 512
+_FAR: Final = 1e37
 CHUNK: Final = 16384
 """Rays per Embree call: large enough to hide the 9 us of a call, small enough to balance the cores."""
 
@@ -83,8 +84,25 @@ class RayScene:
         start = self.to_local(origins)
         return self.occluded_local(start, self.to_local(targets) - start)
 
-    def intersect(self, origins: Points, directions: FloatArray) -> Hits:
-        """The first triangle hit from `origins` along `directions` (n, 3), world coordinates."""
+    def first_local(self, origins: Float32Array, directions: Float32Array) -> IntArray:
+        """The first triangle (n,), or -1, from `origins` along `directions`, (n, 3) local float32 each."""
+        triangle = np.full(len(origins), -1, dtype=np.int32)
+        if self._empty:
+            return triangle
+
+        def query(start: int, stop: int) -> None:
+            triangle[start:stop] = self._scene.run(
+                origins[start:stop], directions[start:stop], query="INTERSECT"
+            )
+
+        run_chunks(query, len(origins), CHUNK, _LEAST)
+        return triangle
+
+    def intersect(self, origins: Points, directions: FloatArray, reach: float = np.inf) -> Hits:
+        """The first triangle hit from `origins` along `directions` (n, 3), world coordinates.
+
+        What is farther than `reach`, in lengths of the direction, is not seen.
+        """
         triangle = np.full(len(origins), -1, dtype=np.int32)
         distance = np.full(len(origins), np.inf)
         if self._empty:
@@ -93,7 +111,14 @@ class RayScene:
         along = np.ascontiguousarray(directions * self.scale, dtype=np.float32)
 
         def query(start: int, stop: int) -> None:
-            found = self._scene.run(local[start:stop], along[start:stop], query="INTERSECT", output=True)
+            found = self._scene.run(
+                local[start:stop],
+                along[start:stop],
+                # Not shared: the library writes where rays have ended into it.
+                dists=np.full(stop - start, min(reach, _FAR), dtype=np.float32),
+                query="INTERSECT",
+                output=True,
+            )
             hit = found["primID"]
             triangle[start:stop] = hit
             distance[start:stop] = np.where(hit >= 0, found["tfar"], np.inf)
