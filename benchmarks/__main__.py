@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from benchmarks.tables import Target
 
-_SECTIONS: Final = ("solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "service")
+_SECTIONS: Final = (
+    "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "service"
+)  # fmt: skip
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 
 
@@ -48,6 +50,7 @@ def bench(
         frames,
         interpolant_frames,
         occlusion,
+        patterns,
         point_irradiance,
         serving,
         solving,
@@ -61,7 +64,7 @@ def bench(
     options = Options(_named(scenes, SCENES, "--scenes") if scenes else every, quick)
     chosen = _named(only, _SECTIONS, "--only") if only else _SECTIONS
     modules = (
-        solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, serving
+        solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, serving
     )  # fmt: skip
     made = (module.section(options) for module in modules)
     plan = [section for section in made if section.name in chosen and section.jobs]

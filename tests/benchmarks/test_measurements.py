@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, frames, occlusion, serving, solving
+from benchmarks import accuracy, frames, occlusion, patterns, serving, solving
 from benchmarks.plan import Options
 from benchmarks.tables import Table
 
@@ -97,6 +97,12 @@ def test_frames_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     figures = frames.measure_frames("cornell", 0.03)
     assert min(figures.flat, figures.gouraud, figures.four_samples, figures.jpeg, figures.path) > 0.0
     assert_whole(frames.tabulate([figures]), 6, "scene", "way", "frames / s")
+
+
+def test_patterns_are_measured() -> None:
+    figures = patterns.measure_pattern("jittered", 4, 1)
+    assert len(figures.errors) == patterns.MOST
+    assert_whole(patterns.tabulate([figures]), 1, "pattern", "1 samples", "64 samples", "slope")
 
 
 @pytest.mark.slow
