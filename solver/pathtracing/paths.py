@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.kernels import inline_kernel
 from solver.types import FloatArray, IntArray
 
 
@@ -17,10 +18,12 @@ class Paths(NamedTuple):
     """(w, 3) metres, off the surface that the ray leaves"""
     direction: FloatArray
     """(w, 3) unit"""
-    cosine: FloatArray
-    """(w,) to the normal at the origin; negative for a ray that leaves the camera"""
+    spread: FloatArray
+    """(w,) pi times the probability per steradian of the direction: off diffuse surfaces the cosine to the
+    normal; negative for a ray that emitter sampling cannot choose as well: from the camera, off a mirror"""
     throughput: FloatArray
-    """(w, 3) what one W/m2 of radiosity at the next vertex adds to the estimate"""
+    """(w, 3) what one W/m2 of radiosity at the next vertex adds to the estimate; where its radiance is not
+    diffuse, radiosity stands for pi times that towards the origin"""
     item: IntArray
     """(w,) row of the task's sums that the path adds to"""
     vertex: IntArray
@@ -49,7 +52,7 @@ def allocate_paths(capacity: int) -> Paths:
     return Paths(
         origin=np.empty((capacity, 3)),
         direction=np.empty((capacity, 3)),
-        cosine=np.empty(capacity),
+        spread=np.empty(capacity),
         throughput=np.empty((capacity, 3)),
         item=np.empty(capacity, dtype=np.int32),
         vertex=np.empty(capacity, dtype=np.int32),
@@ -66,3 +69,33 @@ def allocate_shadow_rays(capacity: int) -> ShadowRays:
         energy=np.empty((capacity, 3)),
         item=np.empty(capacity, dtype=np.int32),
     )
+
+
+@inline_kernel
+def write_path(
+    paths: Paths,
+    row: int,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    spread: float,
+    red: float,
+    green: float,
+    blue: float,
+    item: int,
+    vertex: int,
+    stream: np.uint64,
+    index: np.uint64,
+) -> None:
+    """Write at `row` a ray from (x, y, z) along (dx, dy, dz) to the vertex of that number."""
+    paths.origin[row, 0], paths.origin[row, 1], paths.origin[row, 2] = x, y, z
+    paths.direction[row, 0], paths.direction[row, 1], paths.direction[row, 2] = dx, dy, dz
+    paths.spread[row] = spread
+    paths.throughput[row, 0], paths.throughput[row, 1], paths.throughput[row, 2] = red, green, blue
+    paths.item[row] = item
+    paths.vertex[row] = vertex
+    paths.stream[row] = stream
+    paths.sample[row] = index

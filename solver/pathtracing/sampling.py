@@ -96,21 +96,39 @@ def single(stream: np.uint64, index: np.uint64, number: int) -> float:
 
 
 @inline_kernel
-def cosine_direction(
-    nx: float, ny: float, nz: float, u: float, v: float
-) -> tuple[float, float, float, float]:
-    """Unit direction about a unit normal with density cosine / pi, and its cosine.
+def about(nx: float, ny: float, nz: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The vector (x, y, z) of the z axis' frame in a frame about the unit vector (nx, ny, nz).
 
     The frame is that of Duff et al. 2017, *Building an orthonormal basis, revisited*.
     """
     sign = math.copysign(1.0, nz)
     a = -1.0 / (sign + nz)
     b = nx * ny * a
-    radius, angle = math.sqrt(u), 2.0 * math.pi * v
-    x, y, z = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - u)
     dx = x * (1.0 + sign * nx * nx * a) + y * b + z * nx
     dy = x * sign * b + y * (sign + ny * ny * a) + z * ny
     dz = -x * sign * nx - y * ny + z * nz
+    return dx, dy, dz
+
+
+@inline_kernel
+def cosine_direction(
+    nx: float, ny: float, nz: float, u: float, v: float
+) -> tuple[float, float, float, float]:
+    """Unit direction about a unit normal with density cosine / pi, and its cosine."""
+    radius, angle = math.sqrt(u), 2.0 * math.pi * v
+    x, y, z = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - u)
+    dx, dy, dz = about(nx, ny, nz, x, y, z)
+    return dx, dy, dz, z
+
+
+@inline_kernel
+def lobe_direction(
+    rx: float, ry: float, rz: float, exponent: float, u: float, v: float
+) -> tuple[float, float, float, float]:
+    """Unit direction about a unit vector with density (n + 1) / (2 pi) cosine^n, and its cosine."""
+    z = u ** (1.0 / (exponent + 1.0))
+    radius, angle = math.sqrt(1.0 - z * z), 2.0 * math.pi * v
+    dx, dy, dz = about(rx, ry, rz, radius * math.cos(angle), radius * math.sin(angle), z)
     return dx, dy, dz, z
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from solver.geometry.scene import Camera
 from solver.kernels import kernel
+from solver.pathtracing.connect import cast_shadow_ray
 from solver.pathtracing.paths import Paths, ShadowRays
 from solver.pathtracing.sampling import pair, stream_of, triangle_weights
 from solver.pathtracing.tables import Emitters, ShadingTables, split_corners
-from solver.pathtracing.walk import cast_shadow_ray, leave_vertex
+from solver.pathtracing.walk import leave_vertex
 from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
 
 
@@ -205,7 +206,7 @@ def _begin_camera(
         paths.direction[row, 0] = dx / length
         paths.direction[row, 1] = dy / length
         paths.direction[row, 2] = dz / length
-        paths.cosine[row] = -1.0
+        paths.spread[row] = -1.0
         paths.item[row] = local
         paths.vertex[row] = 0
         paths.stream[row] = stream

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.pathtracing.lobes import Lobes, build_lobes
 from solver.types import FloatArray, IntArray
 from solver.visibility.rays import RayScene
 
@@ -30,6 +31,8 @@ class ShadingTables(NamedTuple):
     """(p,) probability per m2 that emitter sampling gives to each point of a patch"""
     offset: float
     """Metres by which vertices and shadow targets are lifted off their surfaces"""
+    lobes: Lobes | None
+    """What is not diffuse; None where all is"""
 
 
 class Emitters(NamedTuple):
@@ -89,5 +92,6 @@ def build_tables(surfaces: Surfaces, rays: RayScene) -> tuple[ShadingTables, Emi
         emission=np.ascontiguousarray(surfaces.emission),
         density=power / total if total > 0.0 else np.zeros(len(power)),
         offset=rays.offset / rays.scale,
+        lobes=build_lobes(surfaces),
     )
     return tables, emitters

@@ -2,27 +2,42 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from solver.engine.world import World
 from solver.geometry.scene import Material, Mesh, Scene, SceneObject
 from solver.pathtracing import PathTracer
-from solver.types import Points
+from solver.types import FloatArray, Points
 
 CUBE = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
 INWARD = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6))
 """Faces of CUBE seen from inside: z = 0, z = 1, x = 0, x = 1, y = 0, y = 1."""
 OUTWARD = tuple(face[::-1] for face in INWARD)
 
+Triple: TypeAlias = float | Sequence[float] | FloatArray
+"""One number for all channels, or three."""
+
 
 def material(
-    reflectance: float | Sequence[float] = 0.0,
-    emission: float | Sequence[float] = 0.0,
+    reflectance: Triple = 0.0,
+    emission: Triple = 0.0,
     two_sided: bool = False,
+    specular: Triple = 0.0,
+    exponent: float = math.inf,
+    emission_exponent: float = 0.0,
 ) -> Material:
-    return Material(np.broadcast_to(reflectance, 3), np.broadcast_to(emission, 3), two_sided)
+    return Material(
+        np.broadcast_to(reflectance, 3),
+        np.broadcast_to(emission, 3),
+        two_sided,
+        np.broadcast_to(specular, 3),
+        exponent,
+        emission_exponent,
+    )
 
 
 def polygon(name: str, corners: Sequence[Sequence[float]] | Points, of: Material) -> SceneObject:
