@@ -11,6 +11,7 @@ from solver.engine.sampled import SampledSolver
 from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.errors import SolverError
+from solver.geometry.surfaces import Surfaces
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -37,6 +38,7 @@ class Solution:
         else:
             start = earlier if isinstance(earlier, RadiositySolver) else None
             self.solver = RadiositySolver(world.surfaces, world.rays, settings, start)
+        self._beyond_diffuse = _beyond_diffuse(world.surfaces, self.is_sampled)
         self._failure: SolverError | MemoryError | None = None
         self._field: RadiosityField | None = None
         self._field_version = -1
@@ -86,6 +88,7 @@ class Solution:
         told = self.solver.warnings
         if self.is_sampled:
             told = (*told, _sampled_warning(self.world.surfaces.patch_count))
+        told = (*told, *self._beyond_diffuse)
         if self._failure is None:
             return told
         reason = "out of memory" if isinstance(self._failure, MemoryError) else str(self._failure)
@@ -105,6 +108,17 @@ class Solution:
         leaving = field.area * (field.radiosity @ LUMINANCE_WEIGHTS)
         total = np.bincount(surfaces.object[field.patch], leaving, len(surfaces.object_ids))
         return dict(zip(surfaces.object_ids, total.tolist(), strict=True))
+
+
+def _beyond_diffuse(surfaces: Surfaces, is_sampled: bool) -> tuple[str, ...]:
+    """What is told of a scene that is not diffuse. Sampled light has come by mirrors too, linked has not."""
+    who = "The renderers flat, gouraud and interpolant"
+    does, takes = "show surfaces without their specular reflection", "show directional emission as diffuse"
+    if not is_sampled:
+        who = "The renderers flat, gouraud, interpolant and gather, probes and error estimates"
+        does, takes = "leave specular reflection out", "take directional emission as diffuse"
+    parts = [does] * surfaces.has_specular + [takes] * surfaces.has_directional_emission
+    return (f"{who} {' and '.join(parts)}; the renderer path has all of it.",) if parts else ()
 
 
 def _sampled_warning(patches: int) -> str:

@@ -9,7 +9,7 @@ and coloured, quadrilaterals and triangles, full, partial and no visibility, emi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -226,8 +226,19 @@ def _encode() -> None:
 
 
 def _trace() -> None:
-    """A path-traced frame, and irradiance at points and on elements."""
+    """Paths through a diffuse scene, and through gloss and a directional lamp, which other code traces."""
     scene = _room(_RED, _WARM_LIGHT, range(5))
+    _trace_scene(scene)
+    screen, lamp = scene.object("screen"), scene.object("lamp")
+    gloss = replace(screen.material, specular=np.array([0.1, 0.2, 0.3]), exponent=20.0)
+    spot = replace(lamp.material, emission_exponent=4.0)
+    _trace_scene(
+        scene.with_replaced(replace(screen, material=gloss)).with_replaced(replace(lamp, material=spot))
+    )
+
+
+def _trace_scene(scene: Scene) -> None:
+    """A path-traced frame, and irradiance at points and on elements."""
     world = World.of(scene)
     tracer = PathTracer(world.surfaces, world.rays)
     tracer.frame(scene.cameras["main"], passes=2).run()

@@ -72,7 +72,10 @@ for sample in ("cube_room", "office"):
         engine.probe(np.array([[1.0, 1.0, 0.5]]), np.array([[0.0, 0.0, 1.0]]))
         engine.pick(CameraChoice(width=16, height=12), 8, 6)
         engine.status()
-        warm_light = MaterialDocument(emission=[9.0, 5.0, 1.0])
+        warm_light = MaterialDocument(
+            reflectance=[0.2] * 3, emission=[9.0, 5.0, 1.0], emission_exponent=3.0,
+            specular=[0.5] * 3, exponent=9.0,
+        )
         engine.apply([
             SetMaterialEdit(op="set_material", id="lamp", material=warm_light),
             RemoveEdit(op="remove", id=next(reversed(engine.scene.objects))),
