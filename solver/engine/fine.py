@@ -27,7 +27,7 @@ from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.illumination.interpolation.refinement import ViewError, cells_to_split, view_error
 from solver.illumination.meshing.cells import Cells
 from solver.illumination.meshing.splitting import split_cells
-from solver.illumination.meshing.triangulation import Triangulation, triangulate
+from solver.illumination.meshing.triangulation import Triangulation, triangulate_in_steps
 from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.illumination.settings import LightSettings
 from solver.transport.solve import RadiositySolver
@@ -185,7 +185,8 @@ class FineLight:
         self._lines = yield from find_lines(state, hierarchy, field, self._settings)
         triangulation: Triangulation | None = None
         while True:
-            triangulation = triangulate(cells, surfaces, self._lines.edges, triangulation)
+            edges = self._lines.edges
+            triangulation = yield from triangulate_in_steps(cells, surfaces, edges, triangulation)
             yield
             interpolants = Interpolants(
                 point, state.tree.leaves, cells, triangulation, field.irradiance, self._interpolants

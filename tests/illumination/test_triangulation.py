@@ -18,8 +18,10 @@ from solver.illumination.meshing.triangulation import Triangulation, triangulate
 from solver.transport.elements import ElementTree
 from solver.types import FloatArray
 from tests.illumination.triangles import (
+    CASE_C,
+    FLOOR,
+    WALL,
     Segment,
-    Spot,
     areas,
     assert_conforming,
     assert_lawful,
@@ -27,6 +29,7 @@ from tests.illumination.triangles import (
     edges_on,
     gaps,
     marked,
+    segments,
 )
 from tests.rendering.fields import SQUARE, Split, even, polygons, surfaces_of, towards, uneven
 
@@ -37,14 +40,6 @@ SHAPES = {
     "sliver": [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, 0.01, 0.0), (0.0, 0.01, 0.0)],
     "wedge": [(0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (10.0, 0.001, 0.0)],
 }
-
-# A floor with two walls on one of its edges: corners of one lie inside edges of another [H 3.6, case C].
-CASE_C = polygons(
-    [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 1.0, 0.0), (0.0, 1.0, 0.0)],
-    [(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.7, 0.0, 1.0), (0.7, 0.0, 0.0)],
-    [(0.7, 0.0, 0.0), (0.7, 0.0, 1.0), (2.0, 0.0, 0.0)],
-)
-FLOOR, WALL, GABLE = 0, 1, 2
 
 
 def shape(name: str) -> Surfaces:
@@ -57,30 +52,6 @@ def made_of(surfaces: Surfaces, split: Split, segments: list[Segment]) -> Triang
     made = triangulate(cells, surfaces, edges)
     assert_lawful(made, cells, surfaces, edges)
     return made
-
-
-def spots() -> st.SearchStrategy[Spot]:
-    """Anywhere; where corners of cells are; next to them; on edges."""
-    lattice = st.integers(0, 8).map(lambda k: k / 8)
-    beside = st.tuples(lattice, st.sampled_from([1e-12, 1e-9, 1e-6, 1e-3, -1e-9])).map(
-        lambda pair: min(max(pair[0] + pair[1], 0.0), 1.0)
-    )
-    anything = st.floats(0.0, 1.0, allow_subnormal=False)
-    return st.tuples(*[st.one_of(anything, lattice, beside)] * 2)
-
-
-def segments(patches: int = 1) -> st.SearchStrategy[list[Segment]]:
-    """Some segments, and others that are nearly or exactly along them."""
-
-    def with_shadows(drawn: list[Segment], shift: float) -> list[Segment]:
-        beside = [(p, (a[0], min(a[1] + shift, 1.0)), b) for p, a, b in drawn[::2]]
-        pieces = [(p, a, (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))) for p, a, b in drawn[::3]]
-        return drawn + beside + pieces
-
-    one = st.tuples(st.integers(0, patches - 1), spots(), spots())
-    return st.builds(
-        with_shadows, st.lists(one, max_size=12), st.sampled_from([0.0, 1e-13, 1e-9, 1e-4, 1e-3, 2e-3, 1e-2])
-    )
 
 
 @given(
@@ -105,72 +76,6 @@ def test_seams_have_no_gaps(seed: int, depth: int, lines: list[Segment], two_sid
     made = triangulate(cells, surfaces, edges)
     assert_lawful(made, cells, surfaces, edges)
     assert gaps(made, surfaces.size) == 0
-
-
-@given(data=st.data(), seed=st.integers(0, 10_000), lines=segments(3))
-@settings(max_examples=60, deadline=None)
-def test_what_changes_gives_what_a_fresh_start_gives(
-    data: st.DataObject, seed: int, lines: list[Segment]
-) -> None:
-    """Whatever part of the cells and edges is replaced."""
-    surfaces = surfaces_of(CASE_C)
-    before, after = cells_of(surfaces, uneven(seed, 3)), cells_of(surfaces, uneven(seed + 1, 3))
-    known = edges_on(surfaces, lines)
-    first = triangulate(before, surfaces, known)
-    changed = data.draw(st.sets(st.integers(0, 2)))
-    cells = mixed(before, after, changed)
-    kept = [i for i in range(len(lines)) if data.draw(st.integers(0, 5)) > 0]
-    edges = known.take(np.array(kept, dtype=np.int32))
-    assert_equal(triangulate(cells, surfaces, edges, first), triangulate(cells, surfaces, edges))
-
-
-def mixed(before: Cells, after: Cells, changed: set[int]) -> Cells:
-    """Cells of `after` on the patches that are `changed`, of `before` on the others; with other leaves."""
-    old = ~np.isin(before.patch, list(changed))
-    new = ~old if after is before else np.isin(after.patch, list(changed))
-    total = int(old.sum() + new.sum())
-    return Cells(
-        np.concatenate([before.corners[old], after.corners[new]]),
-        np.concatenate([before.corner_count[old], after.corner_count[new]]),
-        np.concatenate([before.patch[old], after.patch[new]]),
-        np.arange(100, 100 + total, dtype=np.int32),
-    )
-
-
-def assert_equal(one: Triangulation, other: Triangulation) -> None:
-    names = ["position", "vertex_patch", "triangles", "patch", "cell", "leaf", "edge_set", "edge_jump"]
-    for name in [*names, "neighbour", "vertex_start", "triangle_start"]:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
-
-
-def test_only_patches_that_change_are_rebuilt() -> None:
-    surfaces = surfaces_of(CASE_C)
-    cells = cells_of(surfaces, uneven(3, 3))
-    inside: Segment = (FLOOR, (0.3, 0.4), (0.6, 0.7))
-    first = triangulate(cells, surfaces, edges_on(surfaces, []))
-    assert first.rebuilt == 3
-    assert triangulate(cells, surfaces, edges_on(surfaces, []), first).rebuilt == 0
-    # What ends within the floor is its own affair; what ends on its seam is also the wall's.
-    assert triangulate(cells, surfaces, edges_on(surfaces, [inside]), first).rebuilt == 1
-    across: Segment = (FLOOR, (0.123, 0.0), (0.6, 0.7))
-    made = triangulate(cells, surfaces, edges_on(surfaces, [across]), first)
-    assert made.rebuilt == 2
-    low, high = made.triangle_start[GABLE], made.triangle_start[GABLE + 1]
-    old = slice(first.triangle_start[GABLE], first.triangle_start[GABLE + 1])
-    np.testing.assert_array_equal(
-        made.position[made.triangles[low:high]], first.position[first.triangles[old]]
-    )
-
-
-def test_sets_and_jumps_alone_make_a_patch_new() -> None:
-    surfaces = shape("square")
-    cells, edges = cells_of(surfaces, even(2)), edges_on(surfaces, [(0, (0.1, 0.2), (0.8, 0.7))])
-    first = triangulate(cells, surfaces, edges)
-    other = ConstraintEdges(edges.patch, edges.ends, edges.set + np.int32(5), ~edges.jump)
-    second = triangulate(cells, surfaces, other, first)
-    assert second.rebuilt == 1
-    assert set(np.unique(second.edge_set)) == {-1, 5}
-    assert np.array_equal(second.edge_jump, first.edge_set == 0)
 
 
 def test_a_plain_square_is_two_triangles() -> None:

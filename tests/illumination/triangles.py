@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import strategies as st
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.meshing.cells import Cells, ConstraintEdges
 from solver.illumination.meshing.skeleton import MINIMUM_LENGTH
 from solver.illumination.meshing.triangulation import Triangulation
 from solver.types import BoolArray, FloatArray, IntArray, Points, Vector
-from tests.rendering.fields import Split, build_field, even
+from tests.rendering.fields import Split, build_field, even, polygons
 
 Spot = tuple[float, float]
 """Where on a patch, in (0, 1) x (0, 1)."""
 
 Segment = tuple[int, Spot, Spot]
 """Patch, and both ends."""
+
+CASE_C = polygons(
+    [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 1.0, 0.0), (0.0, 1.0, 0.0)],
+    [(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.7, 0.0, 1.0), (0.7, 0.0, 0.0)],
+    [(0.7, 0.0, 0.0), (0.7, 0.0, 1.0), (2.0, 0.0, 0.0)],
+)
+"""A floor with two walls on one of its edges: corners of one lie inside edges of another [H 3.6, case C]."""
+
+FLOOR, WALL, GABLE = 0, 1, 2
 
 STRAYING = 6.0
 """Discontinuities move by less than this times the minimum length of their patch's widest cell."""
@@ -24,6 +34,30 @@ STRAYING = 6.0
 def cells_of(surfaces: Surfaces, split: Split | None = None) -> Cells:
     """The leaves of quadtrees over `surfaces`."""
     return Cells.of(build_field(surfaces, split or even(0)))
+
+
+def spots() -> st.SearchStrategy[Spot]:
+    """Anywhere; where corners of cells are; next to them; on edges."""
+    lattice = st.integers(0, 8).map(lambda k: k / 8)
+    beside = st.tuples(lattice, st.sampled_from([1e-12, 1e-9, 1e-6, 1e-3, -1e-9])).map(
+        lambda pair: min(max(pair[0] + pair[1], 0.0), 1.0)
+    )
+    anything = st.floats(0.0, 1.0, allow_subnormal=False)
+    return st.tuples(*[st.one_of(anything, lattice, beside)] * 2)
+
+
+def segments(patches: int = 1) -> st.SearchStrategy[list[Segment]]:
+    """Some segments, and others that are nearly or exactly along them."""
+
+    def with_shadows(drawn: list[Segment], shift: float) -> list[Segment]:
+        beside = [(p, (a[0], min(a[1] + shift, 1.0)), b) for p, a, b in drawn[::2]]
+        pieces = [(p, a, (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))) for p, a, b in drawn[::3]]
+        return drawn + beside + pieces
+
+    one = st.tuples(st.integers(0, patches - 1), spots(), spots())
+    return st.builds(
+        with_shadows, st.lists(one, max_size=12), st.sampled_from([0.0, 1e-13, 1e-9, 1e-4, 1e-3, 2e-3, 1e-2])
+    )
 
 
 def spot_on(surfaces: Surfaces, patch: int, spot: Spot) -> Vector:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.illumination.meshing.ragged import by_group
 from solver.kernels import kernel
 from solver.types import IntArray
 
@@ -11,16 +12,8 @@ from solver.types import IntArray
 def opposite_edges(start: IntArray, end: IntArray, vertex_count: int) -> IntArray:
     """(m,) for each edge start -> end, the one that runs end -> start, or -1; no edge occurs twice."""
     opposite = np.empty(len(start), dtype=np.int32)
-    _match(start, end, *edges_by_start(start, vertex_count), opposite)
+    _match(start, end, *by_group(start, vertex_count), opposite)
     return opposite
-
-
-def edges_by_start(start: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
-    """Edges (m,) sorted by the vertex they start from, and where each vertex's part begins (v + 1,)."""
-    first = np.zeros(vertex_count + 1, dtype=np.int32)
-    order = np.empty(len(start), dtype=np.int32)
-    _sort(start, first, order)
-    return first, order
 
 
 def edge_labels(
@@ -30,25 +23,10 @@ def edge_labels(
     # Labelled edges are looked for from their lower vertex.
     low = np.minimum(a, b)
     high = np.maximum(a, b)
-    first, order = edges_by_start(low, vertex_count)
+    first, order = by_group(low, vertex_count)
     found = np.empty(len(start), dtype=np.int32)
     _look_up(first, order, high, label, start, end, found)
     return found
-
-
-@kernel
-def _sort(start: IntArray, first: IntArray, order: IntArray) -> None:
-    for edge in range(len(start)):
-        first[start[edge] + 1] += 1
-    for v in range(len(first) - 1):
-        first[v + 1] += first[v]
-    # Moved on by one, each is the place of the next edge, and after the last edge the end of its part.
-    for v in range(len(first) - 1, 0, -1):
-        first[v] = first[v - 1]
-    for edge in range(len(start)):
-        v = start[edge]
-        order[first[v + 1]] = edge
-        first[v + 1] += 1
 
 
 @kernel

@@ -13,7 +13,9 @@ asking ends.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -25,6 +27,7 @@ from solver.illumination.meshing.rails import RailPoints, add_points
 from solver.illumination.meshing.rings import Rings, trace_rings
 from solver.illumination.meshing.skeleton import Skeleton
 from solver.parallel import run_chunks
+from solver.transport.pace import Pace
 from solver.types import AnyArray, FloatArray, IntArray, Points
 
 _CHUNK: Final = 256
@@ -59,26 +62,35 @@ class Arrangement:
 
 def arrange(
     chords: Chords, points: RailPoints, edges: ConstraintEdges, skeleton: Skeleton
-) -> tuple[Arrangement, Rings]:
-    """The arrangement of `chords`, which are parts of `edges`, and rings with all points that it takes."""
+) -> Generator[None, None, tuple[Arrangement, Rings]]:
+    """The arrangement of `chords`, which are parts of `edges`, and rings with all points that it takes.
+
+    Yields every few milliseconds.
+    """
     while True:
         rings = trace_rings(skeleton, points)
-        found = _arrange_once(chords, edges, skeleton, rings)
+        yield
+        found = yield from _arrange_once(chords, edges, skeleton, rings)
+        if len(found.wanted_rail) == 0:
+            return found, rings
         count = len(points.rail)
         points, _ = add_points(points, found.wanted_rail, found.wanted_fraction)
+        yield
         if len(points.rail) == count:
             return found, rings
 
 
-def _arrange_once(chords: Chords, edges: ConstraintEdges, skeleton: Skeleton, rings: Rings) -> Arrangement:
-    crossed, first = np.unique(chords.cell, return_index=True)
+def _arrange_once(
+    chords: Chords, edges: ConstraintEdges, skeleton: Skeleton, rings: Rings
+) -> Generator[None, None, Arrangement]:
+    crossed, first, count = np.unique(chords.cell, return_index=True, return_counts=True)
     chord_start = np.append(first, len(chords.cell)).astype(np.int32)
     found: dict[int, tuple[AnyArray, ...]] = {}
 
-    def work(begin: int, stop: int) -> None:
-        found[begin] = arrange_cells(
-            begin,
-            stop,
+    def work(base: int, begin: int, stop: int) -> None:
+        found[base + begin] = arrange_cells(
+            base + begin,
+            base + stop,
             crossed,
             chord_start,
             chords.constraint,
@@ -98,8 +110,12 @@ def _arrange_once(chords: Chords, edges: ConstraintEdges, skeleton: Skeleton, ri
             skeleton.tolerance,
         )
 
-    run_chunks(work, len(crossed), _CHUNK, least=16)
+    yield
+    # Each line of a cell is held against the others.
+    for part in Pace().batches(count * (count + 4)):
+        run_chunks(partial(work, part.start), part.stop - part.start, _CHUNK, least=16)
+        yield
     # The columns of all chunks, in the order of the cells; a call for no cells tells their types.
-    work(len(crossed), len(crossed))
+    work(len(crossed), 0, 0)
     parts = [found[begin] for begin in sorted(found)]
     return Arrangement(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -10,7 +10,9 @@ find the same fraction. That is what makes neighbours agree, with no search for 
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -18,14 +20,19 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.meshing.cells import Cells, ConstraintEdges
 from solver.illumination.meshing.crossing_kernels import find_stops, near_cells
+from solver.illumination.meshing.ragged import starts
 from solver.illumination.meshing.rails import RailPoints, add_points
 from solver.illumination.meshing.skeleton import Skeleton
 from solver.parallel import run_chunks
+from solver.transport.pace import Pace
 from solver.types import FloatArray, IntArray
 
 _EDGES: Final = 64
 _PAIRS: Final = 2048
 """Constraint edges, and pairs of one with a cell, that a core takes at a time."""
+
+_FAR: Final = 64
+"""Cells of an edge's patch that are told to be far from it in the time that one takes otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,35 +51,45 @@ class Chords:
 
 def find_chords(
     cells: Cells, surfaces: Surfaces, edges: ConstraintEdges, skeleton: Skeleton
-) -> tuple[Chords, RailPoints]:
-    """The chords of `edges` in `cells`, which are sorted by patch, and where on rails they stop."""
-    cell_start = np.zeros(surfaces.patch_count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(cells.patch, minlength=surfaces.patch_count), out=cell_start[1:])
+) -> Generator[None, None, tuple[Chords, RailPoints]]:
+    """The chords of `edges` in `cells`, which are sorted by patch, and where on rails they stop.
+
+    Yields every few milliseconds.
+    """
+    cell_start = starts(cells.patch, surfaces.patch_count)
     near: dict[int, IntArray] = {}
     found: dict[int, tuple[IntArray, FloatArray]] = {}
 
-    def search(first: int, last: int) -> None:
-        near[first] = near_cells(
-            first, last, edges.patch, edges.ends, cell_start, skeleton.center, skeleton.diameter
+    def search(base: int, first: int, last: int) -> None:
+        near[base + first] = near_cells(
+            base + first, base + last, edges.patch, edges.ends, cell_start, skeleton.center, skeleton.diameter
         )
 
-    run_chunks(search, len(edges), _EDGES, least=8)
+    cost = 1 + np.diff(cell_start)[edges.patch].astype(np.int64) // _FAR
+    for part in Pace().batches(cost):
+        run_chunks(partial(search, part.start), part.stop - part.start, _EDGES, least=8)
+        yield
     pairs = np.concatenate([np.empty((0, 2), dtype=np.int32), *(near[first] for first in sorted(near))])
 
-    def meet(first: int, last: int) -> None:
-        found[first] = find_stops(
-            pairs[first:last], edges.ends, cells.patch, surfaces.normal, skeleton.start, skeleton.node,
-            skeleton.end, skeleton.rail, skeleton.forward, skeleton.position, skeleton.radius, skeleton.reach,
+    def meet(base: int, first: int, last: int) -> None:
+        found[base + first] = find_stops(
+            pairs[base + first : base + last], edges.ends, cells.patch, surfaces.normal, skeleton.start,
+            skeleton.node, skeleton.end, skeleton.rail, skeleton.forward, skeleton.position, skeleton.radius,
+            skeleton.reach,
         )  # fmt: skip
 
-    run_chunks(meet, len(pairs), _PAIRS, least=64)
+    for part in Pace().batches(np.ones(len(pairs), dtype=np.int64)):
+        run_chunks(partial(meet, part.start), part.stop - part.start, _PAIRS, least=64)
+        yield
     parts = [found[first] for first in sorted(found)]
     stops = np.concatenate([np.empty((0, 4), dtype=np.int32), *(part[0] for part in parts)])
     fraction = np.concatenate([np.empty(0), *(part[1] for part in parts)])
     cell, constraint, rail, code = stops.T
+    yield
     # Stops on rails become points, those that are near each other one.
     on_rail = np.flatnonzero(rail >= 0)
     points, point = add_points(RailPoints.none(), rail[on_rail], fraction[on_rail])
+    yield
     code = code.copy()
     code[on_rail] = len(skeleton.position) + point
     # Chords run between the stops of one edge in one cell that follow each other.

@@ -1,101 +1,84 @@
-"""Triangles of cells: constrained Delaunay triangulations where lines ask for it, patterns elsewhere.
+"""Constrained Delaunay triangles of cells with lines in them.
 
-The library's predicates are exact. All cells of a patch that are left to it lie side by side, each in a
-square of its own, and are triangulated in one call: what a cell becomes depends on its patch alone.
+Cells lie side by side, each in a square of its own, and are triangulated in one call. Points are rounded to
+a grid in their cell's frame on which squares begin at whole numbers: no square's place changes anything
+between its points, and the library's predicates are exact. Ties are settled afterwards (`uniqueness`). What
+a cell becomes depends on that cell alone, whichever cells it is triangulated with.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, Final, cast
 
 import numpy as np
 import pythoncdt
 
-from solver.errors import SolverError
+from solver.illumination.meshing.cell_lines import CellLines
 from solver.illumination.meshing.cell_plane import project
-from solver.illumination.meshing.linework import Linework
-from solver.illumination.meshing.patterns import pattern_triangles
-from solver.illumination.meshing.skeleton import Skeleton
-from solver.illumination.meshing.tiling import settle_tiling
+from solver.illumination.meshing.incircle import BITS
+from solver.illumination.meshing.uniqueness import make_unique
 from solver.kernels import kernel
-from solver.types import BoolArray, FloatArray, IntArray, Points
+from solver.types import FloatArray, Int64Array, IntArray, Points
+
+_GRID: Final = 2.0**BITS
+"""Points of the grid in a cell's diameter: points in its frame are at most one diameter from its centre. The
+steps are far below what counts as flat (`tiling`)."""
 
 _SQUARE: Final = 4.0
 """Side of the square that a cell has to itself, in diameters."""
 
-
-class TriangulationError(SolverError):
-    """The triangles of a patch do not tile its cells."""
-
-    def __init__(self, patch: int, reason: str) -> None:
-        self.patch = patch
-        super().__init__(f"patch {patch} has no valid triangulation: {reason}")
+_MOST_CELLS: Final = int(2.0**52 / _GRID / _SQUARE) ** 2
+"""In one call: as many as leave the points of the last square exact in float64."""
 
 
-@dataclass(frozen=True, eq=False)
-class CellTriangles:
-    """t triangles, sorted by cell."""
+class LibraryError(ValueError):
+    """The library refuses a cell."""
 
-    triangles: IntArray
-    """(t, 3) nodes, from the patch's first, counter-clockwise"""
-    cell: IntArray
-    """(t,) ascending"""
+    def __init__(self, row: int, reason: str) -> None:
+        self.row = row
+        self.reason = reason
+        super().__init__(f"cell {row}: {reason}")
 
 
-def triangulate_cells(
-    lines: Linework, chosen: BoolArray, normals: FloatArray, skeleton: Skeleton
-) -> CellTriangles:
-    """Triangles of the cells of the patches that are `chosen` (p,), with normals (p, 3).
+def constrained_triangles(lines: CellLines) -> tuple[IntArray, Int64Array]:
+    """Triangles (t, 3) of `lines`, in places, and the cell of each, ascending.
 
-    Raises TriangulationError where triangles do not tile a cell.
+    Raises LibraryError for a cell that the library refuses.
     """
-    cells = np.flatnonzero(chosen[lines.cell_patch]).astype(np.int32)
-    triangles, cell, left = pattern_triangles(lines, cells)
-    cut, cut_cell = _constrained(lines, left, skeleton)
-    cell = np.concatenate([cell, cut_cell])
-    order = np.argsort(cell, kind="stable")
-    triangles, cell = np.concatenate([triangles, cut])[order], cell[order]
-    bad = settle_tiling(lines, cells, triangles, cell, normals)
-    if bad >= 0:
-        raise TriangulationError(int(lines.cell_patch[bad]), "triangles overlap or leave gaps")
-    return CellTriangles(triangles, cell)
-
-
-def _constrained(lines: Linework, cells: IntArray, skeleton: Skeleton) -> tuple[IntArray, IntArray]:
-    """Triangles (t, 3) of cells with lines in them, and the cell of each."""
-    if len(cells) == 0:
-        return np.empty((0, 3), dtype=np.int32), np.empty(0, dtype=np.int32)
-    ring = lines.ring_start[cells + 1] - lines.ring_start[cells]
-    vertices = ring + lines.inner_start[cells + 1] - lines.inner_start[cells]
-    edges = ring + lines.edge_start[cells + 1] - lines.edge_start[cells]
-    vertex_start = np.concatenate([[0], np.cumsum(vertices)])
-    edge_start = np.concatenate([[0], np.cumsum(edges)])
-    # Where the cells of each patch begin.
-    patch = lines.cell_patch[cells]
-    first = np.flatnonzero(np.diff(patch, prepend=-1))
-    bounds = np.append(first, len(cells))
-    place = (np.arange(len(cells)) - np.repeat(first, np.diff(bounds))).astype(np.int32)
-    across = np.repeat(np.ceil(np.sqrt(np.diff(bounds))), np.diff(bounds)).astype(np.int32)
-    point = np.empty((vertex_start[-1], 2))
-    node = np.empty(vertex_start[-1], dtype=np.int32)
-    edge = np.empty((edge_start[-1], 2), dtype=np.int32)
+    c = len(lines)
+    if c == 0:
+        return np.empty((0, 3), dtype=np.int32), np.empty(0, dtype=np.int64)
+    if c > _MOST_CELLS:
+        return _by_halves(lines)
+    k, rings = len(lines.position), int(lines.ring_length.sum())
+    across = int(np.ceil(np.sqrt(c)))
+    whole, point = np.empty((k, 2), dtype=np.int64), np.empty((k, 2))
+    edge = np.empty((rings + len(lines.edge), 2), dtype=np.int32)
     _lay_out(
-        cells, patch, place, across, skeleton.center, skeleton.axes, lines.ring_start, lines.ring,
-        lines.inner_start, lines.inner, lines.edge_start, lines.edge, lines.node_start, lines.position, point,
-        node, edge,
+        across, lines.ring_length, lines.start, lines.position, lines.edge_start, lines.edge, lines.center,
+        lines.axes, whole, point, edge,
     )  # fmt: skip
+    try:
+        found = _library(point, edge)
+    except RuntimeError as error:
+        if c == 1:
+            raise LibraryError(0, str(error)) from error
+        return _by_halves(lines)
+    found = make_unique(found, edge, whole)
+    row = lines.place_row[found[:, 0]]
+    return found - lines.start[row][:, None], row
+
+
+def _by_halves(lines: CellLines) -> tuple[IntArray, Int64Array]:
+    """As `constrained_triangles`, of more cells than fit, or of some among which one is refused."""
     parts = []
-    for begin, end in pairwise(bounds.tolist()):
-        low, high = int(vertex_start[begin]), int(vertex_start[end])
-        within = edge[edge_start[begin] : edge_start[end]] - low
+    for rows in np.array_split(np.arange(len(lines)), 2):
         try:
-            parts.append(_library(point[low:high], within) + low)
-        except RuntimeError as error:
-            raise TriangulationError(int(patch[begin]), str(error)) from error
-    found = np.concatenate(parts)
-    return node[found], np.repeat(cells, vertices)[found[:, 0]]
+            triangles, row = constrained_triangles(lines.take(rows))
+        except LibraryError as error:
+            raise LibraryError(int(rows[error.row]), error.reason) from error
+        parts.append((triangles, rows[row]))
+    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
 def _library(points: FloatArray, edges: IntArray) -> IntArray:
@@ -111,44 +94,36 @@ def _library(points: FloatArray, edges: IntArray) -> IntArray:
 
 @kernel
 def _lay_out(
-    cells: IntArray,
-    patch: IntArray,
-    place: IntArray,
-    across: IntArray,
-    center: Points,
-    axes: FloatArray,
-    ring_start: IntArray,
-    ring: IntArray,
-    inner_start: IntArray,
-    inner: IntArray,
+    across: int,
+    ring_length: IntArray,
+    start: IntArray,
+    position: Points,
     edge_start: IntArray,
     edge: IntArray,
-    node_start: IntArray,
-    position: Points,
+    center: Points,
+    axes: FloatArray,
+    whole: Int64Array,
     point: FloatArray,
-    node: IntArray,
     edges: IntArray,
 ) -> None:
-    """Points (k, 2) of all cells, each cell in its own square; their nodes (k,), and edges (e, 2) of points.
+    """Points (k, 2) on the grid, and in squares, `across` of them in a row; edges (e, 2) between points.
 
     They are laid out in their frames, so that Delaunay's criterion is that of the plane but for needles.
     """
-    vertex = 0
     line = 0
-    for i in range(len(cells)):
-        cell = cells[i]
-        begin = vertex
-        length = ring_start[cell + 1] - ring_start[cell]
-        for k in range(length + inner_start[cell + 1] - inner_start[cell]):
-            n = ring[ring_start[cell] + k] if k < length else inner[inner_start[cell] + k - length]
-            node[vertex] = n
-            project(position[node_start[patch[i]] + n], center[cell], axes[cell], point[vertex])
-            point[vertex, 0] += _SQUARE * (place[i] % across[i])
-            point[vertex, 1] += _SQUARE * (place[i] // across[i])
-            vertex += 1
-        for k in range(length):
+    at = np.empty(2)
+    for cell in range(len(ring_length)):
+        begin = start[cell]
+        for k in range(begin, start[cell + 1]):
+            project(position[k], center[cell], axes[cell], at)
+            for axis in range(2):
+                rounded = np.rint(at[axis] * _GRID)
+                square = cell % across if axis == 0 else cell // across
+                whole[k, axis] = np.int64(rounded)
+                point[k, axis] = rounded / _GRID + _SQUARE * square
+        for k in range(ring_length[cell]):
             edges[line, 0] = begin + k
-            edges[line, 1] = begin + (k + 1) % length
+            edges[line, 1] = begin + (k + 1) % ring_length[cell]
             line += 1
         for k in range(edge_start[cell], edge_start[cell + 1]):
             edges[line, 0] = begin + edge[k, 0]

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from solver.illumination.meshing.linework import Linework
+from solver.illumination.meshing.cell_lines import CellLines
 from solver.kernels import inline_kernel, kernel
-from solver.types import IntArray, Points
+from solver.types import Int64Array, IntArray, Points
 
 _STRAIGHT: Final = 1e-6
 """A node of a ring is no corner if the sine of its angle is at most this."""
@@ -23,66 +23,52 @@ _EQUAL: Final = 1e-9
 _NONE: Final = -1
 
 
-def pattern_triangles(lines: Linework, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Triangles (t, 3) of those of `cells` that have a pattern, in nodes from their patch's first.
+def pattern_triangles(lines: CellLines) -> tuple[IntArray, Int64Array, Int64Array]:
+    """Triangles (t, 3), in places, of those of `lines` that have a pattern.
 
-    Returns them, the cell of each, and the cells that have no pattern.
+    Returns them, the cell of each, and the cells that have no pattern; both ascend.
     """
-    patch = lines.cell_patch[cells]
-    count = np.empty(len(cells), dtype=np.int32)
+    count = np.empty(len(lines), dtype=np.int32)
     _count_patterns(
-        cells, patch, lines.corner_count, lines.ring_start, lines.inner_start, lines.edge_start, lines.ring,
-        lines.node_start, lines.position, count,
-    )  # fmt: skip
-    chosen = count != _NONE
-    simple, count = cells[chosen], count[chosen]
+        lines.corner_count, lines.ring_length, lines.start, lines.edge_start, lines.position, count
+    )
+    simple, left = np.flatnonzero(count != _NONE), np.flatnonzero(count == _NONE)
+    count = count[simple]
     triangles = np.empty((int(count.sum()), 3), dtype=np.int32)
-    _fill_patterns(
-        simple, patch[chosen], lines.corner_count, lines.ring_start, lines.inner_start, lines.ring,
-        lines.inner, lines.node_start, lines.position, triangles,
-    )  # fmt: skip
-    return triangles, np.repeat(simple, count), cells[~chosen]
+    _fill_patterns(simple, lines.corner_count, lines.ring_length, lines.start, lines.position, triangles)
+    return triangles, np.repeat(simple, count), left
 
 
 @kernel
 def _count_patterns(
-    cells: IntArray,
-    patch: IntArray,
     corner_count: IntArray,
-    ring_start: IntArray,
-    inner_start: IntArray,
+    ring_length: IntArray,
+    start: IntArray,
     edge_start: IntArray,
-    ring: IntArray,
-    node_start: IntArray,
     position: Points,
     count: IntArray,
 ) -> None:
     """How many triangles the pattern of each cell has; `_NONE` for a cell without one."""
-    for i in range(len(cells)):
-        cell = cells[i]
-        length = ring_start[cell + 1] - ring_start[cell]
-        inner = inner_start[cell + 1] - inner_start[cell]
-        count[i] = _NONE
+    for cell in range(len(count)):
+        length = ring_length[cell]
+        inner = start[cell + 1] - start[cell] - length
+        count[cell] = _NONE
         if edge_start[cell + 1] > edge_start[cell]:
             continue
         if inner == 1:
-            count[i] = length
+            count[cell] = length
         elif length == corner_count[cell] or (
-            length == corner_count[cell] + 1
-            and _straight_corners(ring, ring_start[cell], length, node_start[patch[i]], position) == 1
+            length == corner_count[cell] + 1 and _straight_corners(start[cell], length, position) == 1
         ):
-            count[i] = length - 2
+            count[cell] = length - 2
 
 
 @kernel
-def _straight_corners(ring: IntArray, start: int, length: int, first: int, position: Points) -> int:
+def _straight_corners(start: int, length: int, position: Points) -> int:
     """How many nodes of a ring are no corners."""
     found = 0
     for k in range(length):
-        a = first + ring[start + (k + length - 1) % length]
-        b = first + ring[start + k]
-        c = first + ring[start + (k + 1) % length]
-        sine, _ = _angle(position, a, b, c)
+        sine, _ = _angle(position, start + (k + length - 1) % length, start + k, start + (k + 1) % length)
         if sine <= _STRAIGHT:
             found += 1
     return found
@@ -106,29 +92,23 @@ def _angle(position: Points, a: int, b: int, c: int) -> tuple[float, float]:
 
 @kernel
 def _fill_patterns(
-    cells: IntArray,
-    patch: IntArray,
+    cells: Int64Array,
     corner_count: IntArray,
-    ring_start: IntArray,
-    inner_start: IntArray,
-    ring: IntArray,
-    inner: IntArray,
-    node_start: IntArray,
+    ring_length: IntArray,
+    start: IntArray,
     position: Points,
     triangles: IntArray,
 ) -> None:
     at = 0
-    for i in range(len(cells)):
-        cell = cells[i]
-        start = ring_start[cell]
-        length = ring_start[cell + 1] - start
-        first = node_start[patch[i]]
-        if inner_start[cell + 1] > inner_start[cell]:
+    for cell in cells:
+        first = start[cell]
+        length = ring_length[cell]
+        if start[cell + 1] - first > length:
             # A fan from the middle.
             for k in range(length):
-                triangles[at, 0] = inner[inner_start[cell]]
-                triangles[at, 1] = ring[start + k]
-                triangles[at, 2] = ring[start + (k + 1) % length]
+                triangles[at, 0] = length
+                triangles[at, 1] = k
+                triangles[at, 2] = (k + 1) % length
                 at += 1
             continue
         # A fan from the node inside a side, or from an end of the better diagonal.
@@ -136,26 +116,18 @@ def _fill_patterns(
         if length > corner_count[cell]:
             least = np.inf
             for k in range(length):
-                sine, _ = _angle(
-                    position,
-                    first + ring[start + (k + length - 1) % length],
-                    first + ring[start + k],
-                    first + ring[start + (k + 1) % length],
-                )
+                before, after = (k + length - 1) % length, (k + 1) % length
+                sine, _ = _angle(position, first + before, first + k, first + after)
                 if sine < least:
                     least = sine
                     apex = k
         elif length == 4:
-            a = first + ring[start]
-            b = first + ring[start + 1]
-            c = first + ring[start + 2]
-            d = first + ring[start + 3]
-            sine_b, cosine_b = _angle(position, a, b, c)
-            sine_d, cosine_d = _angle(position, c, d, a)
+            sine_b, cosine_b = _angle(position, first, first + 1, first + 2)
+            sine_d, cosine_d = _angle(position, first + 2, first + 3, first)
             if sine_b * cosine_d + cosine_b * sine_d < -_EQUAL:
                 apex = 1
         for k in range(1, length - 1):
-            triangles[at, 0] = ring[start + apex]
-            triangles[at, 1] = ring[start + (apex + k) % length]
-            triangles[at, 2] = ring[start + (apex + k + 1) % length]
+            triangles[at, 0] = apex
+            triangles[at, 1] = (apex + k) % length
+            triangles[at, 2] = (apex + k + 1) % length
             at += 1

@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
+from solver.illumination.meshing.ragged import by_group
 from solver.illumination.meshing.skeleton import MINIMUM_LENGTH, Skeleton
 from solver.kernels import kernel
-from solver.types import FloatArray, Int64Array, IntArray, Points
+from solver.types import FloatArray, IntArray, Points
 
 APART: Final = 2.0 * MINIMUM_LENGTH
 """Part of a rail's length that lies between points at least."""
@@ -45,7 +46,7 @@ def add_points(points: RailPoints, rail: IntArray, fraction: FloatArray) -> tupl
     known = len(points.rail)
     rails = np.concatenate([points.rail, rail])
     fractions = np.concatenate([points.fraction, fraction])
-    order = np.lexsort((fractions, rails))
+    _, order = sort_along(rails, fractions, int(rails.max(initial=-1)) + 1)
     point = np.full(len(rails), -1, dtype=np.int32)
     point[:known] = np.arange(known, dtype=np.int32)
     source = np.empty(len(rail), dtype=np.int32)
@@ -54,9 +55,29 @@ def add_points(points: RailPoints, rail: IntArray, fraction: FloatArray) -> tupl
     return RailPoints(rails[kept], fractions[kept]), point[known:]
 
 
+def sort_along(rail: IntArray, fraction: FloatArray, count: int) -> tuple[IntArray, IntArray]:
+    """Where the points of each of `count` rails begin (count + 1,), and which they are, along it (k,)."""
+    first, order = by_group(rail, count)
+    _sort_each(first, order, fraction)
+    return first, order
+
+
+@kernel
+def _sort_each(first: IntArray, order: IntArray, fraction: FloatArray) -> None:
+    """By insertion: a rail has few points."""
+    for rail in range(len(first) - 1):
+        for i in range(first[rail] + 1, first[rail + 1]):
+            held = order[i]
+            j = i
+            while j > first[rail] and fraction[order[j - 1]] > fraction[held]:
+                order[j] = order[j - 1]
+                j -= 1
+            order[j] = held
+
+
 @kernel
 def _accept(
-    order: Int64Array,
+    order: IntArray,
     known: int,
     rail: IntArray,
     fraction: FloatArray,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.illumination.meshing.rails import RailPoints
+from solver.illumination.meshing.rails import RailPoints, sort_along
 from solver.illumination.meshing.skeleton import Skeleton
 from solver.kernels import kernel
-from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
+from solver.types import BoolArray, FloatArray, IntArray, Points
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +33,8 @@ class Rings:
 def trace_rings(skeleton: Skeleton, points: RailPoints) -> Rings:
     """The rings of all cells of `skeleton`."""
     m = len(skeleton.node)
-    order = np.lexsort((points.fraction, points.rail))
-    count = np.bincount(points.rail, minlength=m)
-    first = np.zeros(m + 1, dtype=np.int32)
-    np.cumsum(count, out=first[1:])
-    total = m + int(count[skeleton.rail].sum())
+    first, order = sort_along(points.rail, points.fraction, m)
+    total = m + int(np.diff(first)[skeleton.rail].sum())
     start = np.empty(skeleton.cell_count + 1, dtype=np.int32)
     stop, piece = np.empty(total, dtype=np.int32), np.empty(total, dtype=np.int32)
     low, high = np.empty(total), np.empty(total)
@@ -62,7 +59,7 @@ def _trace(
     rail: IntArray,
     forward: BoolArray,
     first: IntArray,
-    order: Int64Array,
+    order: IntArray,
     fraction: FloatArray,
     node_count: int,
     ring_start: IntArray,

@@ -11,6 +11,7 @@ cells are cut along their outlines without any of them ever being moved.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -75,11 +76,15 @@ class Skeleton:
         return len(self.start) - 1
 
 
-def build_skeleton(cells: Cells, surfaces: Surfaces) -> Skeleton:
-    """The outlines of `cells`."""
+def build_skeleton(cells: Cells, surfaces: Surfaces) -> Generator[None, None, Skeleton]:
+    """The outlines of `cells`; yields every few milliseconds."""
     n = len(cells.patch)
     topology = connect(cells)
-    borders = share_borders(topology, cells, surfaces, find_lines(surfaces))
+    yield
+    lines = find_lines(surfaces)
+    yield
+    borders = share_borders(topology, cells, surfaces, lines)
+    yield
     v, s = len(topology.position), len(borders.taken)
     # Nodes inside the edges of cells, edge by edge: of the patch, or of others; no edge has both.
     taken_edge = np.repeat(borders.edge, np.diff(borders.taken_start))
@@ -99,6 +104,7 @@ def build_skeleton(cells: Cells, surfaces: Surfaces) -> Skeleton:
     _list_pieces(
         topology.vertex, cells.corner_count, inside_start, inside, start, side_start, node, end, side
     )
+    yield
     owner = np.arange(m, dtype=np.int32)
     opposite = opposite_edges(node, end, v + s)
     has_opposite = opposite >= 0
@@ -106,6 +112,7 @@ def build_skeleton(cells: Cells, surfaces: Surfaces) -> Skeleton:
     forward = owner == np.arange(m)
     rail = owner.copy()
     _join_seams(borders, side_start, rail, forward)
+    yield
 
     center, along, diameter, width = np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.empty(n)
     _measure(cells.corners, cells.corner_count, center, along, diameter, width)

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from solver.illumination.meshing.linework import Linework
+from solver.illumination.meshing.cell_lines import CellLines
 from solver.kernels import inline_kernel, kernel
 from solver.types import FloatArray, IntArray, Points
 
@@ -28,86 +28,66 @@ _AREA: Final = 1e-9
 """The areas of triangles may miss that of their cell by this part of it."""
 
 
-def settle_tiling(
-    lines: Linework, cells: IntArray, triangles: IntArray, cell: IntArray, normals: FloatArray
-) -> int:
-    """Turn flat pairs of `triangles` (t, 3), sorted by `cell` (t,), so that they tile `cells`.
+def settle_tiling(lines: CellLines, first: IntArray, triangles: IntArray) -> int:
+    """Turn flat pairs of `triangles` (t, 3), in places, so that they tile the cells `lines`.
 
-    Normals (p, 3) are of the patches. Returns a cell that is not tiled by triangles that are all
+    Those of each cell begin at `first` (c + 1,). Returns a cell that is not tiled by triangles that are all
     counter-clockwise, or -1.
     """
-    first = np.searchsorted(cell, cells).astype(np.int32)
-    last = np.searchsorted(cell, cells, side="right").astype(np.int32)
     return int(
         _settle(
-            cells, lines.cell_patch[cells], first, last, triangles, lines.ring_start, lines.ring,
-            lines.inner_start, lines.inner, lines.edge_start, lines.edge, lines.node_start, lines.position,
-            normals,
+            first, triangles, lines.ring_length, lines.start, lines.edge_start, lines.edge, lines.position,
+            lines.normal,
         )
     )  # fmt: skip
 
 
 @kernel
 def _settle(
-    cells: IntArray,
-    patch: IntArray,
     first: IntArray,
-    last: IntArray,
     triangles: IntArray,
-    ring_start: IntArray,
-    ring: IntArray,
-    inner_start: IntArray,
-    inner: IntArray,
+    ring_length: IntArray,
+    start: IntArray,
     edge_start: IntArray,
     edge: IntArray,
-    node_start: IntArray,
     position: Points,
-    normals: FloatArray,
+    normals: Points,
 ) -> int:
-    for i in range(len(cells)):
-        normal = normals[patch[i]]
-        base = node_start[patch[i]]
-        start = ring_start[cells[i]]
+    for cell in range(len(ring_length)):
+        normal = normals[cell]
+        x = position[start[cell] : start[cell + 1]]
+        count = ring_length[cell]
         whole = 0.0
         span = 0.0
         largest = 0.0
-        for k in range(start, ring_start[cells[i] + 1]):
+        for k in range(count):
             for axis in range(3):
-                largest = max(largest, abs(position[base + ring[k], axis]))
-            span = max(span, _distance(position, base + ring[start], base + ring[k]))
-            if k > start and k + 1 < ring_start[cells[i] + 1]:
-                whole += _area(position, base + ring[start], base + ring[k], base + ring[k + 1], normal)
+                largest = max(largest, abs(x[k, axis]))
+            span = max(span, _distance(x, 0, k))
+            if k > 0 and k + 1 < count:
+                whole += _area(x, 0, k, k + 1, normal)
         flat = _ROUNDING * largest
-        # What the lines of the cell run between.
-        count = ring_start[cells[i] + 1] - start
-        fixed = np.empty((edge_start[cells[i] + 1] - edge_start[cells[i]], 2), np.int32)
-        for e in range(len(fixed)):
-            for k in range(2):
-                place = edge[edge_start[cells[i]] + e, k]
-                fixed[e, k] = (
-                    ring[start + place] if place < count else inner[inner_start[cells[i]] + place - count]
-                )
         # Each turn makes the lesser height of two triangles greater; where all is rounding, patience ends it.
-        t = first[i]
-        turns = _TURNS * (last[i] - first[i])
-        while t < last[i]:
-            turned = turns > 0 and _turn(triangles, fixed, t, first[i], last[i], base, position, normal, flat)
+        fixed = edge[edge_start[cell] : edge_start[cell + 1]]
+        begin, end = first[cell], first[cell + 1]
+        t = begin
+        turns = _TURNS * (end - begin)
+        while t < end:
+            turned = turns > 0 and _turn(triangles, fixed, t, begin, end, x, normal, flat)
             turns -= turned
-            t = first[i] if turned else t + 1
+            t = begin if turned else t + 1
         # In the thinnest of needles, rounding decides which area there is.
         doubt = flat * span
         if whole > _SURE * doubt:
             doubt = 0.0
         total = 0.0
-        for t in range(first[i], last[i]):
-            area = _area(
-                position, base + triangles[t, 0], base + triangles[t, 1], base + triangles[t, 2], normal
-            )
+        for t in range(begin, end):
+            area = _area(x, triangles[t, 0], triangles[t, 1], triangles[t, 2], normal)
             if not (area > 0.0 or area > -doubt):
-                return int(cells[i])
+                return cell
             total += area
-        if not abs(total - whole) <= _AREA * whole + doubt * (last[i] - first[i]):
-            return int(cells[i])
+        if not abs(total - whole) <= _AREA * whole + doubt * (end - begin):
+            return cell
     return -1
 
 
@@ -118,7 +98,6 @@ def _turn(
     t: int,
     first: int,
     last: int,
-    base: int,
     position: Points,
     normal: FloatArray,
     flat: float,
@@ -127,14 +106,14 @@ def _turn(
     longest = 0.0
     k = 0
     for i in range(3):
-        length = _distance(position, base + triangles[t, i], base + triangles[t, (i + 1) % 3])
+        length = _distance(position, triangles[t, i], triangles[t, (i + 1) % 3])
         if length > longest:
             longest = length
             k = i
     a = triangles[t, k]
     b = triangles[t, (k + 1) % 3]
     c = triangles[t, (k + 2) % 3]
-    height = _height(position, base + a, base + b, base + c, normal)
+    height = _height(position, a, b, c, normal)
     if height > flat:
         return False
     for e in range(len(fixed)):
@@ -144,9 +123,9 @@ def _turn(
         for i in range(3):
             if triangles[u, i] == b and triangles[u, (i + 1) % 3] == a:
                 d = triangles[u, (i + 2) % 3]
-                one = _height(position, base + a, base + d, base + c, normal)
-                other = _height(position, base + d, base + b, base + c, normal)
-                lesser = min(height, _height(position, base + b, base + a, base + d, normal))
+                one = _height(position, a, d, c, normal)
+                other = _height(position, d, b, c, normal)
+                lesser = min(height, _height(position, b, a, d, normal))
                 if not min(one, other) > lesser:
                     return False
                 triangles[t, 0], triangles[t, 1], triangles[t, 2] = a, d, c

@@ -26,7 +26,7 @@ _STRAIGHT: Final = 2.0**-40
 """A vertex is on an edge if its distance from the edge is at most this times the greatest coordinate: what
 rounding makes of a middle, thousands of times over, and less than the width of the thinnest needle."""
 
-_HASH: Final = -7046029254386353131
+HASH: Final = -7046029254386353131
 """2^64 over the golden ratio, odd, as a signed number: Fibonacci hashing."""
 
 
@@ -60,7 +60,7 @@ def connect(leaves: Leaves) -> Topology:
     corners = np.ascontiguousarray(leaves.corners + 0.0)
     vertex = np.empty((n, 4), dtype=np.int32)
     source = np.empty(4 * n, dtype=np.int32)
-    table = np.full(_table_size(4 * n), -1, dtype=np.int32)
+    table = np.full(table_size(4 * n), -1, dtype=np.int32)
     bits = corners.view(np.int64)
     v = _weld(bits, count, leaves.patch, vertex, source, table)
     position = corners.reshape(-1, 3)[source[:v]]
@@ -88,7 +88,7 @@ def connect(leaves: Leaves) -> Topology:
     )
 
 
-def _table_size(entries: int) -> int:
+def table_size(entries: int) -> int:
     """A power of two that leaves a hash table at least half empty."""
     return 1 << max(2 * entries - 1, 1).bit_length()
 
@@ -108,9 +108,9 @@ def _weld(
             x = bits[leaf, k, 0]
             y = bits[leaf, k, 1]
             z = bits[leaf, k, 2]
-            h = (x ^ patch[leaf]) * _HASH
-            h = ((h ^ (h >> 32)) + y) * _HASH
-            h = ((h ^ (h >> 32)) + z) * _HASH
+            h = (x ^ patch[leaf]) * HASH
+            h = ((h ^ (h >> 32)) + y) * HASH
+            h = ((h ^ (h >> 32)) + z) * HASH
             place = (h >> 24) & mask
             while True:
                 known = table[place]

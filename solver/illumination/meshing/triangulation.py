@@ -10,7 +10,8 @@ The steps, none of them a loop over cells or edges:
 2. `crossings`: where constraint edges meet rails, which get points there, and the chords within cells;
 3. `arrangement`: chords in each cell become a plane graph;
 4. `linework`: all nodes and edges, numbered patch by patch;
-5. `delaunay`: triangles of the patches whose linework is not what it was.
+5. `cell_triangles`: triangles of the cells whose part of it is not what it was;
+6. `connections`: neighbours, and the discontinuities along edges.
 
 The alternative, to snap all lines of a patch to one grid, moves the edges of cells; here they stay as they
 are to the last bit, only discontinuities move, by some thousandths of a cell.
@@ -18,17 +19,19 @@ are to the last bit, only discontinuities move, by some thousandths of a cell.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.meshing.arrangement import arrange
+from solver.illumination.meshing.cell_triangles import CellTriangles, triangulate_cells
 from solver.illumination.meshing.cells import Cells, ConstraintEdges
+from solver.illumination.meshing.connections import connect_triangles
 from solver.illumination.meshing.crossings import find_chords
-from solver.illumination.meshing.delaunay import triangulate_cells
 from solver.illumination.meshing.linework import Linework, draw_lines
-from solver.illumination.meshing.patch_triangles import PatchTriangles, connect_triangles, keep_triangles
 from solver.illumination.meshing.skeleton import build_skeleton
 from solver.types import BoolArray, IntArray, Points
 
@@ -60,13 +63,13 @@ class Triangulation:
     neighbour: IntArray
     """(t, 3) triangle of the same patch across an edge, or -1 on the patch's border"""
     rebuilt: int
-    """Patches that were triangulated; the others have the triangles of the triangulation before"""
+    """Cells that were triangulated; the others have the triangles of the triangulation before"""
     unresolved: IntArray
     """Cells in which some constraint edges were left out, since their lines did not come to rest"""
     linework: Linework
     """What the triangles follow from"""
-    parts: PatchTriangles
-    """The same triangles, in each patch's own numbers"""
+    parts: CellTriangles
+    """The same triangles, as places in the cells of the linework"""
 
 
 def triangulate(
@@ -76,12 +79,29 @@ def triangulate(
     previous: Triangulation | None = None,
     middles: bool = True,
 ) -> Triangulation:
-    """Triangles that tile `cells`, with edges along all `edges`.
+    """As `triangulate_in_steps`, in one go."""
+    work = triangulate_in_steps(cells, surfaces, edges, previous, middles)
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return cast("Triangulation", end.value)
+
+
+def triangulate_in_steps(
+    cells: Cells,
+    surfaces: Surfaces,
+    edges: ConstraintEdges,
+    previous: Triangulation | None = None,
+    middles: bool = True,
+) -> Generator[None, None, Triangulation]:
+    """Triangles that tile `cells`, with edges along all `edges`; yields every few milliseconds.
 
     What of an edge is nearer than `skeleton.MINIMUM_LENGTH`, times the width of the cell, to a vertex or to
-    an edge of cells is moved there. A patch that is as it was in `previous`, the vertices on its border
-    included, keeps its triangles, in their order. With `middles`, a cell that several smaller neighbours
-    touch gets a vertex in its middle: more triangles, but fewer that are long and thin.
+    an edge of cells is moved there. A cell that is as it was in `previous`, whatever its number there, with
+    all vertices on its outline and all lines within it, keeps its triangles, in their order: the same that
+    it would get anew. With `middles`, a cell that several smaller neighbours touch gets a vertex in its
+    middle: more triangles, but fewer that are long and thin.
 
     Raises ValueError for edges that are not finite or not on a patch, TriangulationError where triangles do
     not tile their cell.
@@ -94,30 +114,36 @@ def triangulate(
     order = np.argsort(cells.patch, kind="stable").astype(np.int32)
     cells = Cells(cells.corners[order], cells.corner_count[order], cells.patch[order], cells.leaf[order])
     edges = edges.take(np.argsort(~edges.jump, kind="stable").astype(np.int32))
-    skeleton = build_skeleton(cells, surfaces)
-    chords, points = find_chords(cells, surfaces, edges, skeleton)
-    arrangement, rings = arrange(chords, points, edges, skeleton)
-    lines = draw_lines(cells, edges, skeleton, rings, arrangement, p, middles)
-    kept = np.zeros(p, dtype=np.bool_) if previous is None else lines.same_patches(previous.linework)
-    made = connect_triangles(triangulate_cells(lines, ~kept, surfaces.normal, skeleton), lines)
-    if previous is not None:
-        made = keep_triangles(made, previous.parts, kept)
-    patch = made.patch
-    cell = made.cell + lines.cell_start[patch]
+    yield
+    skeleton = yield from build_skeleton(cells, surfaces)
+    yield
+    chords, points = yield from find_chords(cells, surfaces, edges, skeleton)
+    yield
+    arrangement, rings = yield from arrange(chords, points, edges, skeleton)
+    yield
+    lines = yield from draw_lines(cells, surfaces, edges, skeleton, rings, arrangement, middles)
+    yield
+    before = (None, None) if previous is None else (previous.linework, previous.parts)
+    parts, fresh = yield from triangulate_cells(lines, *before)
+    yield
+    triangles = parts.nodes(lines)
+    triangle_start = parts.start[lines.cell_start]
+    connections = yield from connect_triangles(triangles, triangle_start, lines)
+    cell = np.repeat(np.arange(len(order)), np.diff(parts.start))
     return Triangulation(
         position=lines.position,
         vertex_patch=np.repeat(np.arange(p, dtype=np.int32), np.diff(lines.node_start)),
         vertex_start=lines.node_start,
-        triangles=made.triangles + lines.node_start[patch][:, None],
-        triangle_start=made.start,
-        patch=patch,
+        triangles=triangles,
+        triangle_start=triangle_start,
+        patch=cells.patch[cell],
         cell=order[cell],
         leaf=cells.leaf[cell],
-        edge_set=made.edge_set,
-        edge_jump=made.edge_jump,
-        neighbour=np.where(made.neighbour < 0, np.int32(-1), made.neighbour + made.start[patch][:, None]),
-        rebuilt=int(np.count_nonzero(~kept)),
+        edge_set=connections.edge_set,
+        edge_jump=connections.edge_jump,
+        neighbour=connections.neighbour,
+        rebuilt=len(fresh),
         unresolved=order[np.unique(arrangement.dropped)],
         linework=lines,
-        parts=made,
+        parts=parts,
     )
