@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from benchmarks.tables import Target
 
 _SECTIONS: Final = (
-    "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "service"
+    "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "walks",
+    "service",
 )  # fmt: skip
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 
@@ -54,6 +55,7 @@ def bench(
         point_irradiance,
         serving,
         solving,
+        walks,
     )
     from benchmarks.isolation import in_own_process
     from benchmarks.machine import Machine
@@ -64,7 +66,8 @@ def bench(
     options = Options(_named(scenes, SCENES, "--scenes") if scenes else every, quick)
     chosen = _named(only, _SECTIONS, "--only") if only else _SECTIONS
     modules = (
-        solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, serving
+        solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, walks,
+        serving,
     )  # fmt: skip
     made = (module.section(options) for module in modules)
     plan = [section for section in made if section.name in chosen and section.jobs]

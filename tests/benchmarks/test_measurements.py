@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, frames, occlusion, patterns, serving, solving
+from benchmarks import accuracy, frames, occlusion, patterns, serving, solving, walks
 from benchmarks.plan import Options
 from benchmarks.tables import Table
 
@@ -103,6 +103,15 @@ def test_patterns_are_measured() -> None:
     figures = patterns.measure_pattern("jittered", 4, 1)
     assert len(figures.errors) == patterns.MOST
     assert_whole(patterns.tabulate([figures]), 1, "pattern", "1 samples", "64 samples", "slope")
+
+
+def test_walks_are_measured() -> None:
+    figures = walks.measure_walks(16, 2)
+    assert [hall.lamps for hall in figures.halls] == [1, 8, 248]
+    assert all(hall.seconds > 0.0 and hall.lights >= 16 for hall in figures.halls)
+    table = walks.tabulate([figures])
+    assert_whole(table, 3, "paths", "lamps", "lights", "ms", "of one lamp")
+    assert [target.what for target in table.targets] == ["of one lamp"]
 
 
 @pytest.mark.slow

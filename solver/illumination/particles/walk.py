@@ -33,15 +33,8 @@ from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.emission import Emitters
 from solver.illumination.particles.lights import VirtualLights, join
 from solver.illumination.particles.path_numbers import PathNumbers, PathPoints
-from solver.illumination.particles.walk_kernels import (
-    Particles,
-    Tables,
-    absorb,
-    arrive,
-    emit,
-    leave,
-    reflect,
-)
+from solver.illumination.particles.walk_kernels import absorb, arrive, emit, leave, reflect
+from solver.illumination.particles.walk_tables import Particles, Tables
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
 from solver.visibility.rays import RayScene
 
