@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from solver.document.samples import load_sample
 from solver.illumination.particles.lights import VirtualLights, join, join_blocks
-from solver.illumination.particles.path_numbers import PathPoints
+from solver.illumination.particles.path_numbers import PathNumbers, PathPoints
 from solver.illumination.particles.walk import ParticleWalk, WalkSettings, mean_reflectivity
-from solver.types import LUMINANCE_WEIGHTS, FloatArray
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
 from tests.illumination.particles.rooms import (
     CEILING_LIGHT,
     GREY,
@@ -63,6 +63,22 @@ def test_lights_of_a_generation_share_its_power() -> None:
     np.testing.assert_allclose(lights.power[before_tail], expected[before_tail, None] * [1.0, 1.0, 1.0])
     # In the tail, what is left of the chance to be absorbed is that of a light in the mean.
     np.testing.assert_allclose(lights.power[~before_tail], 1.0 / 100.0)
+
+
+def test_jitter_has_the_range_of_each_generation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """[K 4.1] 1 / N on emitters, 1 / ceil(rho N) for the first directions, and so on; 2 dimensions each."""
+    asked: list[tuple[int, float]] = []
+    pairs = PathNumbers.pairs
+
+    def listened(
+        numbers: PathNumbers, first: int, rows: Int64Array, dimension: int, spread: float
+    ) -> FloatArray:
+        asked.append((dimension, 1.0 / spread))
+        return pairs(numbers, first, rows, dimension, spread)
+
+    monkeypatch.setattr(PathNumbers, "pairs", listened)
+    cube(material(0.6, 1.0)).block(10, settings=WalkSettings(PathPoints.JITTERED))
+    assert asked[:6] == [(2 * k, pytest.approx(n)) for k, n in enumerate([10, 6, 4, 3, 2, 1])]
 
 
 @given(st.floats(0.0, 0.95), st.integers(1, 200), st.integers(0, 5))
