@@ -47,8 +47,7 @@ class FrameQuery(CameraQuery):
 
     renderer: RendererName | None = Field(
         default=None,
-        description="How it is drawn; by default the best that there is, which `X-Renderer` tells. "
-        "`interpolant`, `vpl` and `gather` are not available yet.",
+        description="How it is drawn; by default the best that there is, which `X-Renderer` tells.",
     )
     format: FrameFormat | None = Field(
         default=None,
@@ -61,8 +60,7 @@ class FrameQuery(CameraQuery):
     tone_map: ToneCurve = Field(default=ToneCurve.LINEAR, description="For pictures of radiance.")
     layer: LayerName = Field(
         default=LayerName.RADIANCE,
-        description="What a pixel shows. `triangle`, `barycentric`, `error` and `false_colour` are not "
-        "available yet.",
+        description="What a pixel shows. `triangle`, `barycentric` and `error` are those of interpolants.",
     )
     samples: int = Field(default=1, ge=1, lt=2**31, description="Samples of a pixel, for antialiasing.")
     wait: WaitText = Field(

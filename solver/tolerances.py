@@ -24,3 +24,6 @@ SIDE: Final = 1e-9
 RAY_OFFSET: Final = 2e-6
 """Ray endpoints leave their surface by this times the scene's size: about 16 float32 spacings of the
 unit box in which Embree sees the scene."""
+
+TOUCH: Final = 1e-6
+"""In float32, points nearer to a polygon's plane than this times the scene's size are not behind it."""

@@ -8,7 +8,8 @@ from typing import Annotated, TypeAlias
 from pydantic import Field
 
 from solver.document.fields import Closed
-from solver.illumination.settings import LightSettings
+from solver.illumination.particles.sights import MOST_RESOLUTION
+from solver.illumination.settings import Compensation, LightSettings
 
 _DEFAULTS = LightSettings()
 
@@ -64,6 +65,24 @@ class SettingsDocument(Closed):
     )
     max_triangles: _Count = Field(
         default=_DEFAULTS.max_triangles, description="Triangles after which interpolants are not refined."
+    )
+
+    vpl_reach: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0, le=1.0)] = Field(
+        default=_DEFAULTS.vpl_reach,
+        description="Distance, in diameters of the scene, within which the light of a virtual light is "
+        "bounded; 0: nowhere, which leaves bright spots.",
+    )
+    vpl_compensation: Compensation = Field(
+        default=_DEFAULTS.vpl_compensation,
+        description="How what the bound takes away is put back: `rays`, `solution` or `none`.",
+    )
+    vpl_resolution: Annotated[int, Field(strict=True, ge=2, le=MOST_RESOLUTION)] = Field(
+        default=_DEFAULTS.vpl_resolution,
+        description="Texels along a side of the map of what a virtual light sees.",
+    )
+    max_paths: _Count = Field(
+        default=_DEFAULTS.max_paths,
+        description="Paths after which a frame by virtual lights is not improved any more.",
     )
 
     def changes_to(self, settings: LightSettings) -> LightSettings:

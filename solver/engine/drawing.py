@@ -31,6 +31,7 @@ WITHOUT_LINKS: Final = (
     RendererName.FLAT,
     RendererName.GOURAUD,
     RendererName.INTERPOLANT,
+    RendererName.VPL,
     RendererName.PATH,
 )
 """What draws a solution that has no links; interpolants are drawn as gouraud then."""
@@ -44,6 +45,7 @@ _FINE_LAYERS: Final = (LayerName.TRIANGLE, LayerName.BARYCENTRIC, LayerName.ERRO
 """Only interpolants have these."""
 
 _GATHERED_LAYERS: Final = (LayerName.RADIANCE, LayerName.IRRADIANCE, LayerName.ILLUMINANCE)
+_LIT_LAYERS: Final = (*_GATHERED_LAYERS, LayerName.FALSE_COLOUR)
 _LAYERS: Final = {LayerName(layer.value): layer for layer in Layer}
 
 
@@ -71,10 +73,10 @@ class Drawing:
             if layer not in _GATHERED_LAYERS:
                 raise NotAvailableError("layer of the gather renderer", layer, _GATHERED_LAYERS)
             return
+        if renderer is RendererName.VPL and layer not in _LIT_LAYERS:
+            raise NotAvailableError("layer of the vpl renderer", layer, _LIT_LAYERS)
         if renderer not in _SHADINGS:
-            raise NotAvailableError(
-                "renderer", renderer, (*_SHADINGS, RendererName.GATHER, RendererName.PATH)
-            )
+            return
         if layer in _FINE_LAYERS and renderer is not RendererName.INTERPOLANT:
             there = tuple(name for name in _LAYERS if name not in _FINE_LAYERS)
             raise NotAvailableError(f"layer of the {renderer} renderer", layer, there)

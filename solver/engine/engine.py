@@ -17,6 +17,7 @@ from solver.document.limits import SceneLimits
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
+from solver.engine.instant.frames import InstantFrames
 from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.paths import PathFrames
 from solver.engine.picking import PickResult, pick_point
@@ -34,6 +35,7 @@ from solver.engine.status import Change, ChangeState, EngineStatus, FineStatisti
 from solver.engine.views import (
     Frame,
     GatherView,
+    InstantView,
     InterpolantView,
     Outlook,
     PathView,
@@ -43,6 +45,7 @@ from solver.engine.views import (
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
+from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
 
@@ -69,6 +72,7 @@ class Engine:
         self._drawing = drawing or Drawing()
         self._fine: FineLight | None = None
         self._gathers: GatherFrames | None = None
+        self._instant: InstantFrames | None = None
         self._revision = 1
         self._entries = 0
         self._turn = 0
@@ -112,7 +116,8 @@ class Engine:
             return
         before, self._settings = self._settings, settings
         if settings.solves_as(before):
-            self._fine, self._gathers, self._turn = None, None, self._turn + 1
+            self._fine, self._gathers, self._instant = None, None, None
+            self._turn += 1
         else:
             self._settle(self._world, self._solution)
 
@@ -125,7 +130,10 @@ class Engine:
         refining = self._fine is not None and self._fine.step(0.5 * budget)
         gathering = self._gathers is not None and self._gathers.step(0.5 * budget)
         busy = solving or refining or gathering
-        tracing = self._paths.step(0.5 * budget if busy else budget, self._settings.error_tolerance)
+        share = 0.5 * budget if busy else budget
+        tracing = self._paths.step(share, self._settings.error_tolerance)
+        if self._instant is not None:
+            tracing = self._instant.step(share, self._settings.error_tolerance) or tracing
         self._solution.step(0.5 * budget if tracing else budget)
         return busy or tracing
 
@@ -227,6 +235,8 @@ class Engine:
         solution = Solution(world, self._settings, warm_start)
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
+        if self._instant is not None:
+            self._instant.follow(world)
         self._turn += 1
 
     def _view(self, request: FrameRequest) -> View:
@@ -240,6 +250,8 @@ class Engine:
             return PathView(asked, self._settings.error_tolerance)
         self._drawing.require(renderer, request.layer)
         self._drawing.require_device()
+        if renderer is RendererName.VPL:
+            return self._instant_view(camera, request)
         if self._solution.is_sampled and renderer is RendererName.GATHER:
             raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
         fine = self._fine_light()
@@ -259,6 +271,18 @@ class Engine:
         if self._fine is None and rests and not self._solution.is_sampled:
             self._fine = FineLight(self._solution, self._drawing, self._settings)
         return self._fine
+
+    def _instant_view(self, camera: Camera, request: FrameRequest) -> InstantView:
+        if self._instant is None:
+            self._instant = InstantFrames(self._world, self._settings, self._known_light)
+        asked = self._instant.ask(camera, request.samples, request.max_error, self._drawing)
+        return InstantView(asked, self._world, request.layer, self._settings.error_tolerance)
+
+    def _known_light(self) -> Known | None:
+        """The light of the solution at points of patches, once it is corrected."""
+        fine = self._fine_light()
+        point = None if fine is None else fine.prepare()
+        return None if point is None else point.at_patches
 
     def _gather_view(self, fine: FineLight | None, coarse: SolutionView) -> GatherView:
         if fine is None:

@@ -34,6 +34,7 @@ class RendererName(StrEnum):
     """Radiance interpolated between the corners of elements"""
     INTERPOLANT = "interpolant"
     VPL = "vpl"
+    """By virtual point lights: instant radiosity, straight from the scene"""
     GATHER = "gather"
     PATH = "path"
     """The path-traced check"""

@@ -14,11 +14,14 @@ import numpy as np
 from solver.engine.drawing import Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrame
+from solver.engine.instant.frames import AskedInstant
 from solver.engine.paths import AskedFrame
 from solver.engine.requests import LayerName, RendererName, Wait
 from solver.engine.solution import Solution
 from solver.engine.status import SessionState
+from solver.engine.world import World
 from solver.geometry.scene import Camera
+from solver.rendering.false_colour import false_colour
 from solver.types import LUMINANCE_WEIGHTS, AnyArray
 
 
@@ -256,3 +259,51 @@ class PathView:
     def draw(self) -> AnyArray:
         """Radiance, (height, width, 3) W/(m2 sr)."""
         return self.asked.frame.radiance
+
+
+@dataclass(frozen=True, eq=False)
+class InstantView:
+    """A frame by virtual lights in the making."""
+
+    asked: AskedInstant
+    world: World
+    layer: LayerName
+    tolerance: float
+
+    @property
+    def drawable(self) -> bool:
+        """Once there is light of the scene as it stands."""
+        return self.asked.frame.is_drawable
+
+    @property
+    def error_estimate(self) -> float:
+        """Relative RMS error of reflected light that blocks of lights tell of each other."""
+        return self.asked.frame.error_estimate
+
+    @property
+    def converged(self) -> bool:
+        """Whether that is within the tolerance."""
+        return self.asked.frame.is_new and self.asked.frame.error_estimate <= self.tolerance
+
+    @property
+    def improving(self) -> bool:
+        """More lights always help, until the frame is as good as asked."""
+        return not self.asked.is_done(self.tolerance)
+
+    @property
+    def version(self) -> str:
+        """Of the picture."""
+        return str(self.asked.frame.version)
+
+    def draw(self) -> AnyArray:
+        """Radiance or irradiance (h, w, 3), illuminance (h, w) lux, or what stands for it in colours."""
+        frame = self.asked.frame
+        if self.layer is LayerName.RADIANCE:
+            return frame.radiance().astype(np.float32)
+        irradiance = frame.irradiance().astype(np.float32)
+        if self.layer is LayerName.IRRADIANCE:
+            return irradiance
+        illuminance = irradiance @ LUMINANCE_WEIGHTS.astype(np.float32)
+        if self.layer is LayerName.FALSE_COLOUR:
+            return false_colour(illuminance)
+        return self.world.scene.luminous_efficacy * illuminance

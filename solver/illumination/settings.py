@@ -8,8 +8,20 @@ inside of their triangle (`samples.NUDGE`, parameter 10), where the irradiance i
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from enum import StrEnum
 
 from solver.transport.settings import SolverSettings
+
+
+class Compensation(StrEnum):
+    """How the light is found that bounded virtual lights leave out."""
+
+    RAYS = "rays"
+    """By short rays, and virtual lights where they end"""
+    SOLUTION = "solution"
+    """By short rays, and the radiosity solution where they end, as soon as there is one"""
+    NONE = "none"
+    """Not at all: corners are too dark"""
 
 
 @dataclass(frozen=True)
@@ -28,6 +40,14 @@ class LightSettings(SolverSettings):
     discontinuity for it to be meshed; None: derived from `interpolation_error` and the light in the scene."""
     max_triangles: int = 400_000
     """Triangles after which cells are not split any more."""
+    vpl_reach: float = 0.2
+    """Distance, in diameters of the scene, within which a virtual light is bounded; 0: nowhere."""
+    vpl_compensation: Compensation = Compensation.RAYS
+    """How what the bound takes away is put back."""
+    vpl_resolution: int = 128
+    """Texels along a side of the map of what a virtual light sees, 2 to 255."""
+    max_paths: int = 65_536
+    """Paths after which a frame by virtual lights is not improved any more."""
 
     @property
     def interpolation_tolerance(self) -> float:

@@ -117,15 +117,9 @@ def test_tags_tell_pictures_apart(engine: Engine) -> None:
     assert len({first, second, engine.outlook(request).tag}) == 3
 
 
-def test_a_renderer_that_is_still_to_come_says_so(settled: Engine) -> None:
-    with pytest.raises(NotAvailableError) as refused:
-        settled.frame(FrameRequest(renderer=RendererName.VPL))
-    assert RendererName.GOURAUD in refused.value.available
-
-
 @pytest.mark.parametrize("layer", [LayerName.TRIANGLE, LayerName.BARYCENTRIC, LayerName.ERROR])
 def test_layers_of_interpolants_are_refused_of_other_renderers(settled: Engine, layer: LayerName) -> None:
-    for renderer in (RendererName.GOURAUD, RendererName.GATHER):
+    for renderer in (RendererName.GOURAUD, RendererName.GATHER, RendererName.VPL):
         with pytest.raises(NotAvailableError) as refused:
             settled.frame(FrameRequest(renderer=renderer, layer=layer))
         assert LayerName.RADIANCE in refused.value.available

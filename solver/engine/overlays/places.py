@@ -11,7 +11,7 @@ from solver.engine.overlays.base import Subject, index_of
 from solver.engine.picking import pick_point
 from solver.errors import SceneError
 from solver.geometry.surfaces import Surfaces
-from solver.transport.elements import ElementTree
+from solver.transport.places import leaves_at
 from solver.types import Corners, FloatArray, IntArray, Vector
 
 NEAR: Final = 1e-5
@@ -86,7 +86,7 @@ Address = SurfacePoint | Pixel
 
 def _place(subject: Subject, position: Vector, patch: int) -> Place:
     tree = subject.solution.solver.state.tree
-    element = leaf_at(tree, position, patch)
+    element = int(leaves_at(tree, position[None], np.array([patch], dtype=np.int32))[0])
     interpolants = None if subject.fine is None else subject.fine.interpolants
     if interpolants is None:
         return Place(position, patch, element, None, np.zeros(2))
@@ -99,17 +99,6 @@ def _place(subject: Subject, position: Vector, patch: int) -> Place:
     triangle = int(first) + best
     leaf = int(tree.leaves[mesh.leaf[triangle]])
     return Place(position, patch, leaf, triangle, _clipped(st[best]))
-
-
-def leaf_at(tree: ElementTree, position: Vector, patch: int) -> int:
-    """The leaf of `patch` that a point of its plane lies on; the nearest one where it lies on none."""
-    element = patch
-    while tree.child[element] >= 0:
-        parts = np.arange(tree.child[element], tree.child[element] + tree.child_count[element])
-        normal = np.broadcast_to(tree.patch_normal[patch], (len(parts), 3))
-        height = _border_heights(tree.corners[parts], tree.corner_count[parts], normal, position)
-        element = int(parts[np.argmax(height)])
-    return element
 
 
 def _distances(surfaces: Surfaces, position: Vector) -> FloatArray:

@@ -21,6 +21,7 @@ from solver.illumination.points.light import Lamps, LinksByElement, Sources
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
+from solver.transport.places import leaves_at
 from solver.transport.state import TransportState
 from solver.types import FloatArray, IntArray, Points, Spectra
 from solver.visibility.bvh import Hierarchy
@@ -180,6 +181,11 @@ class PointIrradiance:
         place = np.einsum("nka,na->nk", tree.axes[tree.patch[elements]], positions - tree.centroid[elements])
         functions = self.received[elements]
         return np.asarray(functions[:, 0] + np.einsum("nk,nkc->nc", place, functions[:, 1:]))
+
+    def at_patches(self, positions: Points, patch: IntArray) -> Spectra:
+        """As `solved`, for points on patches (n,), in three channels."""
+        found = self.solved(positions, leaves_at(self.tree, positions, patch))
+        return np.asarray(np.broadcast_to(np.maximum(found, 0.0), (len(positions), 3)))
 
 
 def _light(sources: Sources) -> Light:

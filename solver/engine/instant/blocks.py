@@ -1,0 +1,116 @@
+"""Virtual lights, block by block, walked once, and what they see, traced once for all cameras.
+
+Blocks are complete estimates, the first ones small, so that a frame has all light after some milliseconds;
+those after them double the number of paths each time. What lights see is kept for as many as memory is set
+aside for; others look around again whenever they are needed.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from solver.engine.world import World
+from solver.illumination.particles.lighting import ShiningLights
+from solver.illumination.particles.receivers import Polygons
+from solver.illumination.particles.sights import Sights, look_around
+from solver.illumination.particles.thinning import PATHS, thinned
+from solver.illumination.particles.walk import ParticleWalk
+
+FIRST: Final = 8
+"""Paths of a first block."""
+
+RING: Final = 8
+"""Number of first blocks: K keeps the images of as many paths as they have, and replaces the oldest."""
+
+MOST: Final = 1024
+"""Paths of a block, at most."""
+
+BATCH: Final = 16
+"""Lights that are lit with at once."""
+
+SIGHT_BYTES: Final = 256 * 2**20
+"""Memory for what lights see, of one session."""
+
+
+def block_paths(number: int) -> int:
+    """How many paths the block `number` has."""
+    if number < RING:
+        return FIRST
+    return int(min(FIRST * RING * 2 ** (number - RING), MOST))
+
+
+def first_path(number: int) -> int:
+    """Paths in all blocks before `number`."""
+    if number < RING:
+        return FIRST * number
+    return sum(block_paths(k) for k in range(number))
+
+
+class LightBlock:
+    """The lights of one block, in an order that has nothing to do with where they are."""
+
+    def __init__(self, paths: int, lights: ShiningLights) -> None:
+        self.paths = paths
+        self.lights = lights
+        self.sights: list[Sights | None] = [None] * -(-len(lights) // BATCH)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether what all of its lights see is in memory."""
+        return all(sights is not None for sights in self.sights)
+
+    def batch(self, number: int, factor: float = 1.0) -> ShiningLights:
+        """Some of its lights, `factor` times as strong."""
+        return self.lights.part(number * BATCH, (number + 1) * BATCH, factor)
+
+
+class LightBlocks:
+    """All blocks of one world, made as they are asked for."""
+
+    def __init__(self, world: World, resolution: int, seed: int = 0) -> None:
+        self.world = world
+        self.polygons = Polygons.of(world.surfaces)
+        self._walk = ParticleWalk(world.surfaces, world.rays)
+        self._resolution = resolution
+        self._seed = seed
+        self._blocks: dict[int, LightBlock] = {}
+        self._bytes = 0
+        self.light_count = 0
+        """Lights made so far"""
+
+    def block(self, number: int) -> LightBlock:
+        """The block `number`, which is walked if it is new."""
+        if number not in self._blocks:
+            paths = block_paths(number)
+            surfaces = self.world.surfaces
+            walked = self._walk.block(PATHS * first_path(number), PATHS * paths)
+            lights = thinned(walked, surfaces, paths, self._seed)
+            order = np.random.default_rng((self._seed, number)).permutation(len(lights)).astype(np.int32)
+            lights = lights.take(order)
+            shining = ShiningLights.of(
+                self.polygons, lights.position, lights.normal, lights.power, lights.lobe
+            )
+            self._blocks[number] = LightBlock(paths, shining)
+            self.light_count += len(shining)
+        return self._blocks[number]
+
+    def kept(self, block: LightBlock) -> LightBlock:
+        """`block`, or the largest one of which all is in memory."""
+        if block.is_kept:
+            return block
+        kept = [other for other in self._blocks.values() if other.is_kept]
+        return max(kept, key=lambda other: other.paths, default=block)
+
+    def sights(self, block: LightBlock, batch: int) -> Sights:
+        """What the lights of a batch see."""
+        known = block.sights[batch]
+        if known is not None:
+            return known
+        frames = block.batch(batch).frames
+        found = look_around(self.world.rays, self.polygons, frames, self._resolution)
+        if self._bytes + found.nbytes <= SIGHT_BYTES:
+            self._bytes += found.nbytes
+            block.sights[batch] = found
+        return found

@@ -1,0 +1,122 @@
+"""What bounded lights leave out, put back: light from surfaces that are near to a receiver ([K 5]).
+
+A virtual light's cos cos' / r^2 is bounded by b, so that none makes a spot of its surroundings; what is left
+out is light from within 1 / sqrt(b), of which corners then have too little. All of it is put back here: a ray
+of length 1 / sqrt(b) is sent from the receiver, cosine-distributed, and what it meets shines by the share
+1 - b / (cos cos' / r^2) of its light (Kollig and Keller 2004). That light is what is emitted there, and what
+is reflected: by a solution where there is one, or found as at the receiver itself, by virtual lights and
+one more ray.
+
+In the mean the sum of both is what lights without a bound would give, for any b, but without their spots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
+from solver.illumination.particles.hemisphere import tangent_frames
+from solver.illumination.particles.receivers import Polygons, Receivers
+from solver.kernels import kernel
+from solver.types import Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.visibility.rays import RayScene
+from solver.visibility.sampling import fraction_of, hash_index
+
+Shine: TypeAlias = Callable[[Receivers, int], Float32Array]
+"""Irradiance (3, n) W/m2 of receivers by bounded lights, right in the mean over the turns 0, 1, ..."""
+
+Known: TypeAlias = Callable[[Points, IntArray], FloatArray]
+"""Irradiance (n, 3) W/m2 at points (n, 3) of patches (n,), by a solution."""
+
+_BOUNCES: Final = 16
+"""After so many rays in a row light is left out; each is short, and few meet anything."""
+
+# The plastic number's sequence (Roberts 2018), in two dimensions.
+_FIRST: Final = 0.7548776662466927
+_SECOND: Final = 0.5698402909980532
+_UNIT: Final = 2.0**-31
+
+
+@dataclass(frozen=True, eq=False)
+class NearbyLight:
+    """Puts back what lights bounded by `bound` leave out."""
+
+    surfaces: Surfaces
+    polygons: Polygons
+    rays: RayScene
+    bound: float
+    """Of cos cos' / r^2 with lengths in diameters of the scene"""
+    shine: Shine
+    known: Known | None
+    """Where given, reflected light is this solution's"""
+
+    def at(
+        self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int = 0
+    ) -> Float32Array:
+        """Irradiance (3, n) W/m2 that is to be added at points (n, 3) on `patch` (n,), by a ray each.
+
+        Means over `turn` = 0, 1, ... converge evenly for points of one `stream` (n,) >= 0.
+        """
+        added = np.zeros((3, len(patch)), dtype=np.float32)
+        if len(patch) == 0 or not np.isfinite(self.bound) or bounce == _BOUNCES:
+            return added
+        s = self.surfaces
+        directions = _directions(s.normal[patch], stream, turn, bounce)
+        reach = s.size / np.sqrt(self.bound)
+        # Away from the surface, so that no ray meets it again.
+        start = positions + (self.rays.offset / self.rays.scale) * s.normal[patch]
+        hits = self.rays.intersect(start, directions, reach)
+        found = np.flatnonzero(hits.triangle >= 0).astype(np.int32)
+        triangle, along, distance = hits.triangle[found], directions[found], hits.distance[found]
+        normal = s.normal[s.triangle_patch[triangle, 0]]
+        falling = np.einsum("na,na->n", along, normal)
+        met = np.where(falling < 0.0, s.triangle_patch[triangle, 0], s.triangle_patch[triangle, 1])
+        there = np.abs(falling)
+        here = np.einsum("na,na->n", along, s.normal[patch[found]])
+        kernel_value = here * there * (s.size / np.maximum(distance, 1e-30)) ** 2
+        share = np.maximum(1.0 - self.bound / np.maximum(kernel_value, 1e-30), 0.0)
+        chosen = np.flatnonzero((met >= 0) & (share > 0.0))
+        found, met, share, there = found[chosen], met[chosen].astype(np.int32), share[chosen], there[chosen]
+        places = start[found] + directions[found] * distance[chosen, None]
+        lobe = 0.5 * (s.emission_exponent[met] + 2.0) * there ** s.emission_exponent[met]
+        light = s.emission[met] * lobe[:, None]
+        lit = np.flatnonzero(s.reflectance[met].any(axis=1)).astype(np.int32)
+        light[lit] += s.reflectance[met[lit]] * self._irradiance(
+            places[lit], met[lit], stream[found[lit]], turn, bounce
+        )
+        added[:, found] = (share[:, None] * light).T
+        return added
+
+    def _irradiance(
+        self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int
+    ) -> FloatArray:
+        if self.known is not None:
+            return self.known(positions, patch)
+        lit = self.shine(Receivers.on(self.polygons, positions, patch), turn)
+        lit += self.at(positions, patch, stream, turn, bounce + 1)
+        return np.asarray(lit.T, dtype=np.float64)
+
+
+def _directions(normal: FloatArray, stream: Int64Array, turn: int, bounce: int) -> FloatArray:
+    """Cosine-distributed unit directions (n, 3) about normals (n, 3)."""
+    tangent, other = tangent_frames(normal)
+    local = np.empty((len(normal), 3))
+    _draw(stream, turn, bounce, local)
+    return np.asarray(local[:, :1] * tangent + local[:, 1:2] * other + local[:, 2:] * normal)
+
+
+@kernel
+def _draw(stream: Int64Array, turn: int, bounce: int, local: FloatArray) -> None:
+    """Directions (n, 3) about z: one sequence, shifted for each stream."""
+    for i in range(len(stream)):
+        h = hash_index(np.int64(stream[i]) * _BOUNCES + bounce)
+        u = fraction_of((h & 0x7FFFFFFF) * _UNIT + turn * _FIRST)
+        v = fraction_of(((h >> 31) & 0x7FFFFFFF) * _UNIT + turn * _SECOND)
+        radius = np.sqrt(u)
+        local[i, 0] = radius * np.cos(2.0 * np.pi * v)
+        local[i, 1] = radius * np.sin(2.0 * np.pi * v)
+        local[i, 2] = np.sqrt(1.0 - u)

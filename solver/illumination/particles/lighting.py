@@ -1,0 +1,278 @@
+"""Irradiance by virtual lights, shadowed: what the images of [K 3] add up to, at any points.
+
+Each light adds P / pi cos cos' / r^2 to what sees it, with the product of cosines over r^2 bounded: near a
+light it grows without limit ([K 5]), and what the bound takes away is put back by `compensation`.
+
+A graphics card would do this as a pass over the screen. On a processor, where shaders run on the same cores
+as kernels but pay for both sides of every branch, a kernel does it six times as fast; and it lights whatever
+points there are, texels of lightmaps and ends of rays too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver.illumination.particles.hemisphere import tangent_frames
+from solver.illumination.particles.receivers import Polygons, Receivers, local
+from solver.illumination.particles.sights import Sights, Texels
+from solver.kernels import inline_kernel, kernel
+from solver.parallel import run_chunks
+from solver.tolerances import TOUCH
+from solver.types import Float32Array, FloatArray, IntArray, Points
+
+BLOCK: Final = 256
+"""Receivers lit together: their terms stay in the first-level cache."""
+
+_CHUNK: Final = 8 * BLOCK
+
+
+@dataclass(frozen=True, eq=False)
+class ShiningLights:
+    """m lights as the kernel takes them."""
+
+    frames: Float32Array
+    """(12, m) local position, unit normal, and two tangents"""
+    power: Float32Array
+    """(m, 3) local: W over pi and the squared size of the scene, W/m2"""
+    lobe: Float32Array
+    """(m,) exponent of the cosine that intensity goes by, 1 for Lambert's"""
+
+    @classmethod
+    def of(
+        cls, polygons: Polygons, position: Points, normal: FloatArray, power: FloatArray, lobe: FloatArray
+    ) -> ShiningLights:
+        """Lights at world `position` (m, 3) of `power` (m, 3) W."""
+        tangent, other = tangent_frames(normal)
+        frames = np.concatenate([local(polygons.surfaces, position), normal, tangent, other], axis=1).T
+        scale = 0.5 * (lobe + 1.0) / (np.pi * polygons.surfaces.size**2)
+        return cls(
+            np.ascontiguousarray(frames, dtype=np.float32),
+            (power * scale[:, None]).astype(np.float32),
+            lobe.astype(np.float32),
+        )
+
+    def __len__(self) -> int:
+        return len(self.lobe)
+
+    def part(self, first: int, last: int, factor: float = 1.0) -> ShiningLights:
+        """The lights [first, last), `factor` times as strong."""
+        return ShiningLights(
+            np.ascontiguousarray(self.frames[:, first:last]),
+            np.float32(factor) * self.power[first:last],
+            self.lobe[first:last],
+        )
+
+
+def add_light(
+    irradiance: Float32Array,
+    receivers: Receivers,
+    lights: ShiningLights,
+    sights: Sights,
+    bound: float,
+) -> None:
+    """Add to `irradiance` (3, n) W/m2 what `lights` give to `receivers` that their `sights` do not hide.
+
+    `bound` is local: of cos cos' / r^2 with lengths in diameters of the scene; infinite for none.
+    """
+    run_chunks(
+        lambda start, stop: _light(
+            start, stop, receivers.frame, receivers.polygon, lights.frames, lights.power, lights.lobe,
+            sights.texels, sights.start, sights.polygon, sights.cone, np.float32(bound), irradiance,
+        ),
+        len(receivers),
+        _CHUNK,
+    )  # fmt: skip
+
+
+@kernel
+def _light(
+    start: int,
+    stop: int,
+    receivers: Float32Array,
+    polygon: IntArray,
+    lights: Float32Array,
+    power: Float32Array,
+    lobe: Float32Array,
+    texels: Texels,
+    sight_start: IntArray,
+    seen: IntArray,
+    cone: Float32Array,
+    bound: np.float32,
+    irradiance: Float32Array,
+) -> None:
+    gain = np.empty(BLOCK, dtype=np.float32)
+    texel = np.empty(BLOCK, dtype=np.int32)
+    unclear = np.empty(BLOCK, dtype=np.int32)
+    low = np.empty(3, dtype=np.float32)
+    high = np.empty(3, dtype=np.float32)
+    zero = np.float32(0.0)
+    size = texels.shape[1]
+    for first in range(start, stop, BLOCK):
+        last = min(stop, first + BLOCK)
+        n = last - first
+        x, y, z = receivers[0, first:last], receivers[1, first:last], receivers[2, first:last]
+        nx, ny, nz = receivers[3, first:last], receivers[4, first:last], receivers[5, first:last]
+        own = polygon[first:last]
+        red, green, blue = irradiance[0, first:last], irradiance[1, first:last], irradiance[2, first:last]
+        is_flat = _bounds(receivers, first, last, low, high)
+        for k in range(lights.shape[1]):
+            # Whole blocks behind the light, or with the light behind them.
+            reach = zero
+            for axis in range(3):
+                a = lights[3 + axis, k]
+                reach += a * ((high[axis] if a > zero else low[axis]) - lights[axis, k])
+            if reach <= zero:
+                continue
+            if is_flat and (
+                nx[0] * (lights[0, k] - x[0]) + ny[0] * (lights[1, k] - y[0]) + nz[0] * (lights[2, k] - z[0])
+                <= zero
+            ):
+                continue
+            _receive(x, y, z, nx, ny, nz, lights, k, bound, size, gain, texel)
+            if lobe[k] != np.float32(1.0):
+                _shape(x, y, z, lights, k, lobe[k], gain)
+            # Who does not see the light for certain, and then whether they do.
+            sight = texels[k].reshape(size * size)
+            base = sight_start[k]
+            count = 0
+            for i in range(n):
+                at = texel[i]
+                q = sight[at]
+                same = q == sight[at + 1] and q == sight[at + size] and q == sight[at + size + 1]
+                unclear[count] = i
+                count += not (same and seen[base + q] == own[i]) and gain[i] > zero
+            for j in range(count):
+                i = unclear[j]
+                at = texel[i]
+                if _is_hidden(
+                    x[i], y[i], z[i], x[i] - lights[0, k], y[i] - lights[1, k], z[i] - lights[2, k], own[i],
+                    base, sight[at], sight[at + 1], sight[at + size], sight[at + size + 1], seen, cone,
+                ):  # fmt: skip
+                    gain[i] = zero
+            r, g, b = power[k, 0], power[k, 1], power[k, 2]
+            for i in range(n):
+                red[i] += gain[i] * r
+                green[i] += gain[i] * g
+                blue[i] += gain[i] * b
+
+
+@kernel
+def _bounds(receivers: Float32Array, first: int, last: int, low: Float32Array, high: Float32Array) -> bool:
+    """Bounding box of some receivers; whether they lie on one plane."""
+    is_flat = True
+    for axis in range(3):
+        low[axis] = high[axis] = receivers[axis, first]
+        for i in range(first + 1, last):
+            low[axis] = min(low[axis], receivers[axis, i])
+            high[axis] = max(high[axis], receivers[axis, i])
+            is_flat = is_flat and receivers[3 + axis, i] == receivers[3 + axis, first]
+    if not is_flat:
+        return False
+    x, y, z = receivers[3, first], receivers[4, first], receivers[5, first]
+    level = x * receivers[0, first] + y * receivers[1, first] + z * receivers[2, first]
+    for i in range(first + 1, last):
+        if abs(x * receivers[0, i] + y * receivers[1, i] + z * receivers[2, i] - level) > np.float32(TOUCH):
+            return False
+    return True
+
+
+@inline_kernel
+def _receive(
+    x: Float32Array,
+    y: Float32Array,
+    z: Float32Array,
+    nx: Float32Array,
+    ny: Float32Array,
+    nz: Float32Array,
+    lights: Float32Array,
+    k: int,
+    bound: np.float32,
+    size: int,
+    gain: Float32Array,
+    texel: IntArray,
+) -> None:
+    """Bounded cos cos' / r^2 of a light at receivers (n,), and the first of the four texels around each."""
+    zero = np.float32(0.0)
+    half = np.float32(0.5) * np.float32(size)
+    shift = half - np.float32(0.5)
+    most = np.float32(size) - np.float32(1.01)
+    vx, vy, vz = lights[0, k], lights[1, k], lights[2, k]
+    ax, ay, az = lights[3, k], lights[4, k], lights[5, k]
+    tx, ty, tz = lights[6, k], lights[7, k], lights[8, k]
+    bx, by, bz = lights[9, k], lights[10, k], lights[11, k]
+    for i in range(len(x)):
+        dx, dy, dz = x[i] - vx, y[i] - vy, z[i] - vz
+        square = dx * dx + dy * dy + dz * dz
+        here = max(-(nx[i] * dx + ny[i] * dy + nz[i] * dz), zero)
+        there = max(ax * dx + ay * dy + az * dz, zero)
+        gain[i] = min(here * there / (square * square), bound) if square > zero else zero
+        s, t = tx * dx + ty * dy + tz * dz, bx * dx + by * dy + bz * dz
+        scale = half / max(abs(s) + abs(t) + there, np.float32(1e-30))
+        column = min(max((s + t) * scale + shift, zero), most)
+        row = min(max((s - t) * scale + shift, zero), most)
+        texel[i] = np.int32(row) * np.int32(size) + np.int32(column)
+
+
+@inline_kernel
+def _shape(
+    x: Float32Array,
+    y: Float32Array,
+    z: Float32Array,
+    lights: Float32Array,
+    k: int,
+    lobe: np.float32,
+    gain: Float32Array,
+) -> None:
+    """Let a light shine by a power of the cosine, of which Lambert's is in `gain` (n,)."""
+    for i in range(len(x)):
+        dx, dy, dz = x[i] - lights[0, k], y[i] - lights[1, k], z[i] - lights[2, k]
+        square = dx * dx + dy * dy + dz * dz
+        there = lights[3, k] * dx + lights[4, k] * dy + lights[5, k] * dz
+        if there > np.float32(0.0):
+            gain[i] *= (there / np.sqrt(square)) ** (lobe - np.float32(1.0))
+
+
+@inline_kernel
+def _is_hidden(
+    x: np.float32,
+    y: np.float32,
+    z: np.float32,
+    dx: np.float32,
+    dy: np.float32,
+    dz: np.float32,
+    own: int,
+    base: int,
+    q0: int,
+    q1: int,
+    q2: int,
+    q3: int,
+    seen: IntArray,
+    cone: Float32Array,
+) -> bool:
+    """Whether the line (dx, dy, dz) from a light to a receiver crosses one of the polygons seen around it."""
+    # No views of rows: threads would contend for their counts of references. Few branches: none is foreseen.
+    before = -1
+    for corner in range(4):
+        texel = q0 if corner == 0 else q1 if corner == 1 else q2 if corner == 2 else q3
+        if texel == before:
+            continue
+        before = texel
+        q = base + texel
+        behind = cone[q, 12] * x + cone[q, 13] * y + cone[q, 14] * z - cone[q, 15]
+        if behind > np.float32(TOUCH) and seen[q] != own:
+            inside = min(
+                min(
+                    cone[q, 0] * dx + cone[q, 1] * dy + cone[q, 2] * dz,
+                    cone[q, 3] * dx + cone[q, 4] * dy + cone[q, 5] * dz,
+                ),
+                min(
+                    cone[q, 6] * dx + cone[q, 7] * dy + cone[q, 8] * dz,
+                    cone[q, 9] * dx + cone[q, 10] * dy + cone[q, 11] * dz,
+                ),
+            )
+            if inside >= np.float32(0.0):
+                return True
+    return False
