@@ -1,9 +1,9 @@
 """Maps of a hemisphere on a square: octahedral, so that texels near the horizon are as large as others.
 
 A hemicube spends half of its texels on a quarter of the solid angle, and a paraboloid bends lines. Here the
-upper half of an octahedron, seen from above, is a square; texels differ by less than a factor of 3 in solid
-angle, and straight lines in space are straight in the map but for a bend where they pass from one face of
-the octahedron to the next.
+upper half of an octahedron, seen from above, is a square; no texel has more than 1.7 times the mean solid
+angle, and straight lines in space are straight in the map but for a bend where they pass from one face of the
+octahedron to the next.
 """
 
 from __future__ import annotations
