@@ -110,7 +110,7 @@ def test_nothing_to_light_and_nothing_to_light_with() -> None:
 # --- closed forms ---
 
 
-@given(st.integers(0, 1000), st.sampled_from([0.0, 0.5, 1.0, 2.5, 7.0, 40.0]))
+@given(st.integers(0, 1000), st.sampled_from([1.0, 1.5, 3.0, 7.0, 40.0]))
 @settings(max_examples=20)
 def test_lobes_shine_by_a_power_of_the_cosine(seed: int, lobe: float) -> None:
     """(k + 1) / (2 pi) cos^k cos' / r^2 of each watt."""
