@@ -27,7 +27,7 @@ from tests.illumination.particles.shining import shining_of, spread
 from tests.illumination.particles.twin import irradiance_of
 from tests.pathtracing.agreement import assert_agrees
 
-SEEDS = 300
+SEEDS = 600
 
 
 def colours(k: int) -> Material:
