@@ -175,10 +175,9 @@ class FineLight:
     def _run(self) -> Iterator[None]:
         surfaces = self._solution.world.surfaces
         state, hierarchy = self._solver.state, self._solver.hierarchy
-        point = PointIrradiance.of(state, hierarchy, self._settings.point_accuracy)
-        yield
+        point = yield from PointIrradiance.in_steps(state, hierarchy, self._settings.point_accuracy)
         state = yield from corrected(state, point)
-        point = self._point = PointIrradiance.of(state, hierarchy, self._settings.point_accuracy)
+        point = self._point = point.of_light(state)
         yield
         field = self._solution.field()
         cells = Cells.of(field)

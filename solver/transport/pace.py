@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Generator, Iterator
+from typing import Final, TypeVar
 
 import numpy as np
 
 from solver.types import Int64Array
 
+R = TypeVar("R")
+
 SLICE: Final = 0.012
 """Seconds that a batch should take."""
 
-_FIRST: Final = 512.0
-_LEAST: Final = 32.0
+_FIRST: Final = 64.0
+_LEAST: Final = 8.0
 _MOST: Final = 32768.0
 
 
@@ -35,5 +37,15 @@ class Pace:
             yield slice(first, last)
             seconds = time.perf_counter() - start
             rate = (int(ends[last - 1]) - done) / max(seconds, 1e-6)
-            self._cost = min(_MOST, max(_LEAST, min(2.0 * self._cost, SLICE * rate)))
+            self._cost = min(_MOST, max(_LEAST, min(4.0 * self._cost, SLICE * rate)))
             first = last
+
+
+def finish(work: Generator[object, None, R]) -> R:
+    """What `work` comes to, in one go."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: R = end.value
+            return result

@@ -24,6 +24,7 @@ from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
+from solver.transport.pace import finish
 from solver.types import FloatArray, IntArray, Spectra
 
 _MANY: Final = 1 << 16
@@ -166,12 +167,7 @@ def irradiance(
     tree: ElementTree, links: LinkTable, closure: FloatArray, remainder: FloatArray, radiosity: FloatArray
 ) -> FloatArray:
     """As `irradiance_in_steps`, in one."""
-    work = irradiance_in_steps(tree, links, closure, remainder, radiosity)
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return np.asarray(end.value)
+    return finish(irradiance_in_steps(tree, links, closure, remainder, radiosity))
 
 
 def means(tree: ElementTree, functions: FloatArray) -> Spectra:

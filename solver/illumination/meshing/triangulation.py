@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from solver.illumination.meshing.connections import connect_triangles
 from solver.illumination.meshing.crossings import find_chords
 from solver.illumination.meshing.linework import Linework, draw_lines
 from solver.illumination.meshing.skeleton import build_skeleton
+from solver.transport.pace import finish
 from solver.types import BoolArray, IntArray, Points
 
 
@@ -80,12 +80,7 @@ def triangulate(
     middles: bool = True,
 ) -> Triangulation:
     """As `triangulate_in_steps`, in one go."""
-    work = triangulate_in_steps(cells, surfaces, edges, previous, middles)
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return cast("Triangulation", end.value)
+    return finish(triangulate_in_steps(cells, surfaces, edges, previous, middles))
 
 
 def triangulate_in_steps(

@@ -172,7 +172,8 @@ def _backproject(
         factors[k, 0] = factor_of(work, ABOVE, count, normal)
         kept = cull(
             x, 0, normal, work, ABOVE, count, desk.pyramid, 0, sides, desk.pool, 0, near, sight.corners,
-            sight.sides, sight.normals, sight.pyramids, sight.raised, blocker_tolerance, desk.pool, near,
+            sight.sides, sight.normals, sight.pyramids, sight.cones, sight.raised, blocker_tolerance,
+            desk.pool, near,
         )  # fmt: skip
         factors[k, 1] = 0.0
         visible = 0

@@ -97,8 +97,8 @@ def gather_anywhere(
             used += blockers
             if waiting == LANES or k == found - 1:
                 add_waiting(
-                    x, i, normal, desk, waiting, used, accuracy * total, 0.0, elements, light, sight,
-                    blocker_tolerance, out,
+                    x, i, normal, desk, waiting, used, desk.pool, accuracy * total, 0.0, elements, light,
+                    sight, blocker_tolerance, out,
                 )  # fmt: skip
                 waiting = 0
                 used = 0

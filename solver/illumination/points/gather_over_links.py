@@ -63,7 +63,7 @@ def gather_over_links(
     """Irradiance out (n, channels) at points [start, stop) that lie on leaf elements (n,).
 
     `expected` (n,) luminance irradiance scales `accuracy`: the share of it that an element's residual may
-    bring, and that what counts with the visibility of its links may bring altogether. A lamp is a patch that
+    bring, and the RMS error of all that count with the visibility of their links. A lamp is a patch that
     emits, whole; links are those of the leaf and its ancestors, `light` without emission. A point within
     `tolerance` metres of a plane sees what is there edge-on.
     """
@@ -81,9 +81,8 @@ def gather_over_links(
             for c in range(out.shape[1]):
                 out[i, c] += factor * emission[lamps.source[k], c]
         share = accuracy * expected[i]
-        allowance = share
+        allowance = share * share
         waiting = 0
-        used = 0
         while e >= 0:
             for k in range(links.first[e], links.first[e + 1]):
                 row = links.row[k]
@@ -95,8 +94,6 @@ def gather_over_links(
                     continue
                 blockers = links.blocker_count[row]
                 begin = links.blocker_start[row]
-                for b in range(blockers):
-                    desk.pool[used + b] = links.pool[begin + b]
                 lay(
                     desk.waiting,
                     desk.polygon,
@@ -105,24 +102,23 @@ def gather_over_links(
                     x,
                     elements.corners,
                     source,
-                    used,
+                    -1 - begin,
                     blockers,
                     links.visibility[row],
                 )
                 waiting += 1
-                used += blockers
                 if waiting == LANES:
                     allowance = add_waiting(
-                        x, i, normal, desk, waiting, used, share, allowance, elements, light, sight,
+                        x, i, normal, desk, waiting, 0, links.pool, share, allowance, elements, light, sight,
                         tolerance, out,
                     )  # fmt: skip
                     waiting = 0
-                    used = 0
             e = parent[e]
         if waiting > 0:
             add_waiting(
-                x, i, normal, desk, waiting, used, share, allowance, elements, light, sight, tolerance, out
-            )
+                x, i, normal, desk, waiting, 0, links.pool, share, allowance, elements, light, sight,
+                tolerance, out,
+            )  # fmt: skip
 
 
 @kernel
@@ -155,7 +151,7 @@ def _lamp_factor(
             kept = cull(
                 x, point, normal, buffers.work, ABOVE, count, desk.pyramid, 0, sides, lamps.pool, first,
                 first + lamps.blocker_count[row], sight.corners, sight.sides, sight.normals, sight.pyramids,
-                sight.raised, tolerance, desk.pool, 0,
+                sight.cones, sight.raised, tolerance, desk.pool, 0,
             )  # fmt: skip
         if kept == 0:
             factor = factor_of(buffers.work, ABOVE, count, normal)

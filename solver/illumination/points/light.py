@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,6 +13,7 @@ from solver.geometry.surfaces import Surfaces
 from solver.parallel import run_chunks
 from solver.transport.links import LinkTable
 from solver.transport.oracle import element_residuals
+from solver.transport.pace import Pace
 from solver.transport.pushpull import pull
 from solver.transport.state import TransportState
 from solver.types import BoolArray, Corners, FloatArray, Int64Array, IntArray
@@ -113,8 +115,11 @@ class Lamps:
         counts: IntArray,
         patch: IntArray,
         leaves: IntArray,
-    ) -> Lamps:
-        """Pairs of `leaves` (l,) and emitting patches; corners, counts, patch are the elements'."""
+    ) -> Generator[None, None, Lamps]:
+        """Pairs of `leaves` (l,) and emitting patches; corners, counts, patch are the elements'.
+
+        Yields every few milliseconds.
+        """
         lamps = np.flatnonzero(surfaces.emission.any(axis=1)).astype(np.int32)
         tolerance = tolerances.SIDE * surfaces.size
         p, q = np.repeat(leaves, len(lamps)), np.tile(lamps, len(leaves))
@@ -140,7 +145,13 @@ class Lamps:
                 at += done
             lists[start] = np.concatenate(pieces)
 
-        run_chunks(work, n, _CHUNK, _LEAST)
+        for part in Pace().batches(np.ones(n, dtype=np.int64)):
+
+            def batch(start: int, stop: int, first: int = part.start) -> None:
+                work(first + start, first + stop)
+
+            run_chunks(batch, part.stop - part.start, _CHUNK, _LEAST)
+            yield
         pool = np.concatenate([lists[start] for start in sorted(lists)] or [kept[:0]])
         first = np.zeros(len(patch) + 1, dtype=np.int64)
         np.cumsum(np.bincount(p, minlength=len(patch)), out=first[1:])

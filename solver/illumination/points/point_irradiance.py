@@ -7,6 +7,7 @@ from all patches.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,9 +19,11 @@ from solver.illumination.points.desk import Elements, Light
 from solver.illumination.points.gather_anywhere import gather_anywhere
 from solver.illumination.points.gather_over_links import Table, gather_over_links
 from solver.illumination.points.light import Lamps, LinksByElement, Sources
+from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
+from solver.transport.pace import finish
 from solver.transport.places import leaves_at
 from solver.transport.state import TransportState
 from solver.types import FloatArray, IntArray, Points, Spectra
@@ -42,6 +45,7 @@ FEW_PATCHES: Final = 256
 """With so many patches or fewer it is sooner done to ask all of them than to follow links."""
 
 _CHUNK: Final = 64
+_MANY: Final = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +82,30 @@ class PointIrradiance:
     ) -> PointIrradiance:
         """Of the light in `state`; `hierarchy` holds the patches that block.
 
-        `accuracy`: share of a point's irradiance that the treatment of one source may err by. Sources that
-        bring less than it are not clipped, and elements are entered until their nonlinear rest brings less.
-        Scenes of `few` patches or fewer do without links.
+        `accuracy`: share of a point's irradiance that the treatment of one source may err by, and those
+        together that count with the visibility of their link. Elements are entered until their nonlinear
+        rest brings less. Scenes of `few` patches or fewer do without links.
         """
+        return finish(PointIrradiance.in_steps(state, hierarchy, accuracy, few))
+
+    @staticmethod
+    def in_steps(
+        state: TransportState,
+        hierarchy: Hierarchy,
+        accuracy: float = DEFAULT_ACCURACY,
+        few: int = FEW_PATCHES,
+    ) -> Generator[None, None, PointIrradiance]:
+        """As `of`; yields every few milliseconds."""
         tree = state.tree
-        leaves = tree.leaves
-        received = tree.area[leaves] @ np.maximum(state.received[leaves, 0] @ state.weights, 0.0)
         by_element = lamps = None
         if tree.patch_count > few:
             by_element = LinksByElement.of(state.links, len(tree))
-            lamps = Lamps.of(state.surfaces, hierarchy, tree.corners, tree.corner_count, tree.patch, leaves)
+            yield
+            lamps = yield from Lamps.of(
+                state.surfaces, hierarchy, tree.corners, tree.corner_count, tree.patch, tree.leaves
+            )
+        light = Sources.of(state, reflected_only=False)
+        yield
         return PointIrradiance(
             surfaces=state.surfaces,
             hierarchy=hierarchy,
@@ -97,12 +114,22 @@ class PointIrradiance:
             links=state.links,
             by_element=by_element,
             lamps=lamps,
-            light=Sources.of(state, reflected_only=False),
+            light=light,
             reflected=Sources.of(state, reflected_only=True),
             received=state.received,
             emission=state.emission,
             weights=state.weights,
-            darkness=_DARKNESS * float(received) / max(float(tree.area[leaves].sum()), 1e-300),
+            darkness=_darkness(state),
+        )
+
+    def of_light(self, state: TransportState) -> PointIrradiance:
+        """That of `state`, which has the same tree and links, and other light."""
+        return replace(
+            self,
+            light=Sources.of(state, reflected_only=False),
+            reflected=Sources.of(state, reflected_only=True),
+            received=state.received,
+            darkness=_darkness(state),
         )
 
     def of_reflected(self) -> PointIrradiance:
@@ -178,14 +205,51 @@ class PointIrradiance:
     def solved(self, positions: Points, elements: IntArray) -> Spectra:
         """Irradiance (n, channels) at points on leaves by the solution's own linear functions."""
         tree = self.tree
-        place = np.einsum("nka,na->nk", tree.axes[tree.patch[elements]], positions - tree.centroid[elements])
-        functions = self.received[elements]
-        return np.asarray(functions[:, 0] + np.einsum("nk,nkc->nc", place, functions[:, 1:]))
+        found = np.empty((len(positions), self.received.shape[2]))
+        run_chunks(
+            lambda start, stop: _evaluate(
+                start, stop, positions, elements, tree.patch, tree.axes, tree.centroid, self.received, found
+            ),
+            len(positions),
+            _MANY,
+        )
+        return found
 
     def at_patches(self, positions: Points, patch: IntArray) -> Spectra:
         """As `solved`, for points on patches (n,), in three channels."""
         found = self.solved(positions, leaves_at(self.tree, positions, patch))
         return np.asarray(np.broadcast_to(np.maximum(found, 0.0), (len(positions), 3)))
+
+
+def _darkness(state: TransportState) -> float:
+    leaves, area = state.tree.leaves, state.tree.area
+    received = area[leaves] @ np.maximum(state.received[leaves, 0] @ state.weights, 0.0)
+    return _DARKNESS * float(received) / max(float(area[leaves].sum()), 1e-300)
+
+
+@kernel
+def _evaluate(
+    start: int,
+    stop: int,
+    positions: Points,
+    elements: IntArray,
+    patch: IntArray,
+    axes: FloatArray,
+    centroid: Points,
+    functions: FloatArray,
+    found: FloatArray,
+) -> None:
+    for i in range(start, stop):
+        e = elements[i]
+        p = patch[e]
+        u = 0.0
+        v = 0.0
+        for axis in range(3):
+            from_centroid = positions[i, axis] - centroid[e, axis]
+            u += axes[p, 0, axis] * from_centroid
+            v += axes[p, 1, axis] * from_centroid
+        for c in range(found.shape[1]):
+            found[i, c] = functions[e, 0, c] + u * functions[e, 1, c] + v * functions[e, 2, c]
 
 
 def _light(sources: Sources) -> Light:

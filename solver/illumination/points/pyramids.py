@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from solver.kernels import inline_kernel, kernel
-from solver.types import Corners, FloatArray, Int64Array, IntArray
+from solver.types import Corners, Float32Array, FloatArray, Int64Array, IntArray
 
 AXIS: Final = 0
 SINE: Final = 3
@@ -37,6 +37,14 @@ HIDDEN: Final = -1
 
 _ROUNDING: Final = 1e-15
 """By how much more than they must the cosine of two axes has to differ for their cones to be apart."""
+
+_NEARLY: Final = np.float32(4e-6)
+"""As much for cones in few digits."""
+
+_WIDEST: Final = np.float32(0.99999)
+"""A cone's sine in few digits, at most; wider ones are asked in full."""
+
+_ALL_AROUND: Final = np.float32(1e6)
 
 SLIVER: Final = 1e-14
 """What reaches past a side by less than this angle does not: so much may rounding make of an edge that two
@@ -204,6 +212,8 @@ class Sight(NamedTuple):
     """(b, 3)"""
     pyramids: FloatArray
     """(b, PYRAMID)"""
+    cones: Float32Array
+    """(b, 5) their cones alone: axis, sine and cosine of half the angle, so that all fit the nearest cache"""
     raised: Int64Array
     """(b,) for which point"""
 
@@ -212,7 +222,14 @@ class Sight(NamedTuple):
 def make_sight(corners: Corners, sides: IntArray, normals: FloatArray) -> Sight:
     """Of polygons that no point has seen."""
     b = len(normals)
-    return Sight(corners, sides, normals, np.empty((b, PYRAMID)), np.full(b, -1, dtype=np.int64))
+    return Sight(
+        corners,
+        sides,
+        normals,
+        np.empty((b, PYRAMID)),
+        np.empty((b, 5), dtype=np.float32),
+        np.full(b, -1, dtype=np.int64),
+    )
 
 
 @inline_kernel
@@ -248,6 +265,15 @@ def _stands_aside(
     return aside
 
 
+@inline_kernel
+def _copy_cone(pyramids: FloatArray, row: int, cones: Float32Array) -> None:
+    """A pyramid's cone in few digits; from within it, one that nothing is aside of."""
+    for column in range(5):
+        cones[row, column] = pyramids[row, AXIS + column]
+    if cones[row, 3] >= _WIDEST:
+        cones[row, 4] = -_ALL_AROUND
+
+
 @kernel
 def cull(
     x: FloatArray,
@@ -266,6 +292,7 @@ def cull(
     sides: IntArray,
     normals: FloatArray,
     pyramids: FloatArray,
+    cones: Float32Array,
     raised: Int64Array,
     tolerance: float,
     out: IntArray,
@@ -278,18 +305,27 @@ def cull(
     is raised for another is raised anew. Returns how many there are, or HIDDEN.
     """
     ax, ay, az, sine, cosine, sliver = cone_of(polygons, slot, count)
+    nearly_x, nearly_y, nearly_z = np.float32(ax), np.float32(ay), np.float32(az)
+    nearly_sine, nearly_cosine = np.float32(sine), np.float32(cosine)
     kept = 0
     for b in range(first, stop):
         blocker = blockers[b]
         if raised[blocker] != point:
             raise_pyramid(x, corners, blocker, sides[blocker], normals, blocker, tolerance, pyramids, blocker)
+            _copy_cone(pyramids, blocker, cones)
             raised[blocker] = point
+        # Most are aside, and few digits tell.
+        limit = nearly_cosine * cones[blocker, 4] - nearly_sine * cones[blocker, 3] - _NEARLY
+        along = nearly_x * cones[blocker, 0] + nearly_y * cones[blocker, 1] + nearly_z * cones[blocker, 2]
+        if along < limit and nearly_sine < _WIDEST:
+            continue
         cut = CLEAR
-        if kept != HIDDEN and not cones_part(ax, ay, az, sine, cosine, pyramids, blocker):
+        if not cones_part(ax, ay, az, sine, cosine, pyramids, blocker):
             cut = sides_cut(polygons, slot, count, pyramids, blocker, sides[blocker], tolerance, sliver)
         if cut == 0:
             kept = HIDDEN
-        elif cut != CLEAR and not _stands_aside(
+            break
+        if cut != CLEAR and not _stands_aside(
             x, normal, corners, blocker, sides[blocker], sources, source, source_sides
         ):
             out[used + kept] = blocker

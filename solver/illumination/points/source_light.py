@@ -4,8 +4,9 @@ A source is entered as far as its radiosity residual, times the point's form fac
 quartered where they are close and their gradient is felt. What is left counts with the radiosity where the
 light that arrives from it comes from on average. Elements are taken in blocks, whose form factors are found
 in lanes; only those that the horizon cuts, or that blockers may hide, are looked at alone. An element's
-blockers are those of its parent that are not clear of it. Visible parts are exact, but for what brings no
-more than an allowance altogether: it counts with the visibility of its link.
+blockers are those of its parent that are not clear of it. Visible parts are exact, but for weak elements,
+which count with the visibility v of their link. Of those a point sees all or nothing at worst, with a
+variance of v (1 - v), and an allowance bounds the sum over all that are treated so.
 """
 
 from __future__ import annotations
@@ -32,6 +33,15 @@ from solver.types import FloatArray, IntArray, Points
 _MISSED: Final = 0.5
 """Part of the linear variation of an element's radiosity that the places which stand for it miss at a point
 that touches it. It falls with the fourth power of the distance where that is greater than the element."""
+
+_TOGETHER: Final = 4.0
+"""Elements that are hidden or seen together, side by side: errors are independent in groups of so many."""
+
+_UNTOLD: Final = 1.0 / 64.0
+"""Least variance of what a point sees of a source of which its element sees some, or seems to see all."""
+
+_AT_MOST: Final = 1.0 / 64.0
+"""Part of what is left of the allowance that one element may take: strong ones are left to be exact."""
 
 _QUARTERED: Final = 8
 """How often a leaf may be quartered for it."""
@@ -156,6 +166,7 @@ def add_waiting(
     desk: Desk,
     top: int,
     used: int,
+    far_pool: IntArray,
     limit: float,
     allowance: float,
     elements: Elements,
@@ -166,9 +177,10 @@ def add_waiting(
 ) -> float:
     """Add to row `point` of out (n, channels) the irradiance at x (3,) from `top` elements on the desk.
 
-    The point is before their fronts; their blockers take up `used` places of the pool. Elements are entered
-    whose residual brings more than `limit`; `allowance` is what may still count with the visibility of links:
-    its rest is returned.
+    The point is before their fronts; their blockers take up `used` places of the desk's pool, or begin in
+    `far_pool` at -1 less what is told as their first. Elements are entered
+    whose residual brings more than `limit`; `allowance` is the squared error that the visibility of links may
+    still make: its rest is returned.
     """
     # Fields are taken out once: each time counts as a reference.
     child = elements.child
@@ -204,6 +216,7 @@ def add_waiting(
     blocker_sides = sight.sides
     blocker_normals = sight.normals
     pyramids = sight.pyramids
+    cones = sight.cones
     raised = sight.raised
     spare = len(pool) - len(stack_corners) // PER_BLOCKER
     while top > 0:
@@ -246,18 +259,23 @@ def add_waiting(
             enters = factor * variation > limit and top + children <= DEPTH and lane[k, 3] < _QUARTERED
             # Those who may hide some of it.
             brings = factor * luminance[e]
-            if blockers > 0 and not enters and brings <= allowance:
-                allowance -= brings
-                factor *= lane_visibility[k]
+            seen = lane_visibility[k]
+            unsure = _TOGETHER * max(seen * (1.0 - seen), _UNTOLD) * brings * brings
+            if blockers > 0 and not enters and unsure <= _AT_MOST * allowance:
+                allowance -= unsure
+                factor *= seen
                 blockers = 0
             if blockers > 0 and factor > 0.0:
                 polygon_of_lane(block, k, sides, work, WHOLE)
                 if not is_cut:
                     polygon_of_lane(block, k, sides, work, ABOVE)
                 raise_pyramid(origin, work, WHOLE, sides, normals, p, 0.0, pyramid, 0)
+                lists = far_pool if first < 0 else pool
+                begin = -1 - first if first < 0 else first
                 kept = cull(
-                    x, point, normal, work, ABOVE, count, pyramid, 0, sides, pool, first, first + blockers,
-                    blocker_corners, blocker_sides, blocker_normals, pyramids, raised, tolerance, pool, used,
+                    x, point, normal, work, ABOVE, count, pyramid, 0, sides, lists, begin, begin + blockers,
+                    blocker_corners, blocker_sides, blocker_normals, pyramids, cones, raised, tolerance, pool,
+                    used,
                 )  # fmt: skip
                 if kept == HIDDEN:
                     factor = 0.0
