@@ -75,6 +75,13 @@ class FrameQuery(CameraQuery):
         description="Bounds every wait; then the best frame comes, with `X-Converged: false`. The service "
         "has a bound of its own, ten minutes unless configured otherwise.",
     )
+    budget_ms: float | None = Field(
+        default=None,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="The best frame that so much time allows, by as many paths as fit: "
+        "it comes sooner only if it is as good as `wait` asks, or within the tolerance.",
+    )
 
     def frame(self) -> FrameRequest:
         """What is to be drawn."""
@@ -88,4 +95,10 @@ class FrameQuery(CameraQuery):
 
     def waiting(self) -> Wait:
         """How good it is to be."""
+        if self.budget_ms is not None and self.wait.until is WaitFor.NONE:
+            return Wait(WaitFor.CONVERGED)
         return self.wait
+
+    def longest_ms(self, most: float) -> float:
+        """How long it may be waited for, at most `most` ms."""
+        return min(most, *(bound for bound in (self.timeout_ms, self.budget_ms) if bound is not None), most)

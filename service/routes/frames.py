@@ -55,13 +55,11 @@ async def session_frame(
     The geometry is always that of `X-Revision`; `wait` says how good the light must be.
     """
     chosen = query.format or choose_format(accept)
-    longest = float(context.settings.max_wait_ms)
-    timeout_ms = longest if query.timeout_ms is None else min(query.timeout_ms, longest)
     asked = GetFrame(
         frame=query.frame(),
         encoding=query.encoding(chosen),
         wait=query.waiting(),
-        timeout=timeout_ms / 1000.0,
+        timeout=query.longest_ms(float(context.settings.max_wait_ms)) / 1000.0,
         known_tags=known_tags(if_none_match),
     )
     answer = await unless_gone(request, session.worker.call(asked))

@@ -197,6 +197,21 @@ def test_layers_of_interpolants(client: TestClient, settled: str, layer: str) ->
 # --- waiting ---
 
 
+def test_a_budget_is_spent_on_as_many_paths_as_fit(client: TestClient, settled: str) -> None:
+    asked = {"renderer": "vpl", "width": 64, "height": 48}
+    errors = []
+    for budget in (30, 1500):
+        answer = client.get(f"{settled}/frame", params={**asked, "budget_ms": budget})
+        assert answer.status_code == 200
+        errors.append(float(answer.headers["x-error-estimate"]))
+    assert errors[1] < errors[0]
+
+
+def test_a_frame_within_the_tolerance_does_not_use_its_budget(client: TestClient, settled: str) -> None:
+    answer = client.get(f"{settled}/frame", params={"renderer": "gouraud", "budget_ms": 60_000})
+    assert answer.headers["x-converged"] == "true"
+
+
 def test_a_frame_can_wait_for_convergence(client: TestClient, session: str) -> None:
     answer = client.get(f"{session}/frame", params={"wait": "converged"})
     assert answer.headers["x-converged"] == "true"
