@@ -68,6 +68,9 @@ class Interpolants:
         """Point irradiances computed."""
         if before is not None:
             self._take_over(before)
+        self._error = np.zeros(t)
+        self._mean = np.zeros(t)
+        self._measure(np.arange(t, dtype=np.int32))
         self._work = self._run()
 
     # --- what it holds -------------------------------------------------------------------------------
@@ -102,18 +105,14 @@ class Interpolants:
     def errors(self) -> FloatArray:
         """(t,) estimated RMS error of the luminance irradiance over each triangle, W/m2.
 
-        Of triangles not yet checked, what their samples have been moved by, or as much as they curve.
+        Of triangles not yet checked, as much as they curve. Who waits for a frame asks often: both this and
+        the mean are kept, and brought up to date for the triangles that are worked on.
         """
-        r = self._values[self._samples.node] @ self._point.weights
-        middle = (4.0 * r[:, 1::2].sum(axis=1) - r[:, 0::2].sum(axis=1)) / 9.0
-        found = _MIDDLE * np.abs(middle - self._check @ self._point.weights)
-        curved = np.abs(r[:, 1::2] - 0.5 * (r[:, 0::2] + r[:, [2, 4, 0]])).max(axis=1)
-        return np.asarray(np.where(self._checked, found, curved))
+        return self._error
 
     def mean_luminance(self) -> FloatArray:
         """(t,) mean luminance irradiance of each triangle, W/m2."""
-        r = self._values[self._samples.node] @ self._point.weights
-        return np.asarray(r[:, 1::2].mean(axis=1))
+        return self._mean
 
     def sample_points(self) -> tuple[Points, Spectra, BoolArray]:
         """Positions (m, 3), irradiances (m, channels), and which of them are exact (m,)."""
@@ -150,11 +149,13 @@ class Interpolants:
                 self._exact[chosen] = True
                 self._changed(len(chosen))
                 yield True
+            self._measure(triangles)
             for part in self._pace.batches(np.ones(len(triangles), dtype=np.int64)):
                 chosen = triangles[part]
                 elements = self._elements[leaf[chosen]]
                 self._check[chosen] = self._point.at(self._middle[chosen], elements)
                 self._checked[chosen] = True
+                self._measure(chosen)
                 self._changed(len(chosen))
                 yield True
 
@@ -166,6 +167,15 @@ class Interpolants:
         worth = self._wanted[open_] * (1e-3 + self.errors()[open_] / max(self.mean_luminance().max(), 1e-300))
         best = open_[np.argsort(-worth, kind="stable")[: _BATCH // 4]]
         return best.astype(np.int32)
+
+    def _measure(self, triangles: IntArray) -> None:
+        """Find error and mean of some triangles (m,) anew."""
+        r = self._values[self._samples.node[triangles]] @ self._point.weights
+        middle = (4.0 * r[:, 1::2].sum(axis=1) - r[:, 0::2].sum(axis=1)) / 9.0
+        found = _MIDDLE * np.abs(middle - self._check[triangles] @ self._point.weights)
+        curved = np.abs(r[:, 1::2] - 0.5 * (r[:, 0::2] + r[:, [2, 4, 0]])).max(axis=1)
+        self._error[triangles] = np.where(self._checked[triangles], found, curved)
+        self._mean[triangles] = r[:, 1::2].mean(axis=1)
 
     def _changed(self, evaluations: int) -> None:
         self.evaluations += evaluations
