@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from typing import Final, Protocol
 
 from solver.document.limits import SceneLimits
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
-from solver.engine.requests import FrameRequest
+from solver.engine.instant.frames import InstantFrames
+from solver.engine.requests import FrameRequest, RendererName
+from solver.engine.views import InstantView
 from solver.engine.world import World
 from solver.geometry.scene import Scene
 from solver.illumination.settings import LightSettings
@@ -94,6 +97,57 @@ class RadiosityPicture:
     def draw(self) -> AnyArray:
         """The frame."""
         return self._engine.frame(self._request).image
+
+
+class InstantPicture:
+    """A frame by virtual point lights, without any solution, lit until it is within the tolerance."""
+
+    def __init__(self, scene: Scene, request: FrameRequest, tolerance: float, drawing: Drawing) -> None:
+        """Raises SceneError, NotAvailableError, LimitExceededError, RenderingUnavailableError."""
+        drawing.require(RendererName.VPL, request.layer)
+        world = World.of(scene)
+        frames = InstantFrames(world, LightSettings(error_tolerance=tolerance), _no_solution)
+        camera = request.camera.resolve(scene)
+        self._frame = frames.ask(camera, request.samples, tolerance, drawing)
+        self._view = InstantView(self._frame, world, request.layer, tolerance)
+        self._tolerance = tolerance
+        self.warnings = world.surfaces.warnings
+        """Of the scene."""
+
+    @property
+    def progress(self) -> float:
+        """The variance that was to be reached over the present one, about."""
+        return (self._tolerance / max(self.error_estimate, self._tolerance)) ** 2
+
+    @property
+    def error_estimate(self) -> float:
+        """Of reflected light."""
+        return self._view.error_estimate
+
+    @property
+    def converged(self) -> bool:
+        """Whether that is within the tolerance."""
+        return self._view.converged
+
+    @property
+    def summary(self) -> str:
+        """Paths whose light is in it."""
+        return f"{self._frame.frame.paths:,} paths"
+
+    def step(self, budget: float) -> bool:
+        """Light it on."""
+        start = time.perf_counter()
+        while self._view.improving and time.perf_counter() - start < budget:
+            self._frame.frame.step()
+        return self._view.improving
+
+    def draw(self) -> AnyArray:
+        """The frame."""
+        return self._view.draw()
+
+
+def _no_solution() -> None:
+    """There is none."""
 
 
 class PathPicture:

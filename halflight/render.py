@@ -30,6 +30,7 @@ class Renderer(StrEnum):
     FLAT = "flat"
     GOURAUD = "gouraud"
     INTERPOLANT = "interpolant"
+    VPL = "vpl"
     GATHER = "gather"
     PATH = "path"
 
@@ -102,7 +103,7 @@ def render(
     Exit status: 0 done; 1 this machine cannot do it; 2 an input is not acceptable; 3 the picture is
     written, but a limit ended the solve before the tolerance.
     """
-    from halflight.pictures import PathPicture, RadiosityPicture
+    from halflight.pictures import InstantPicture, PathPicture, RadiosityPicture
     from solver.engine.drawing import Drawing, encode
     from solver.engine.requests import Encoding, FrameRequest, LayerName, NotAvailableError, RendererName
     from solver.errors import LimitExceededError, RenderingUnavailableError, SceneError
@@ -138,7 +139,8 @@ def render(
             drawing = Drawing()
             if drawing.problem is not None:
                 fail(drawing.problem, ExitCode.UNABLE)
-            picture = RadiosityPicture(loaded, request, tolerance, drawing)
+            made = InstantPicture if renderer is Renderer.VPL else RadiosityPicture
+            picture = made(loaded, request, tolerance, drawing)
         _work(picture, tolerance)
         content = encode(picture.draw(), request.layer, encoding)
     except SceneError as refused:

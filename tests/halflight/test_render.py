@@ -89,7 +89,7 @@ def test_suffix_says_the_format(scene: Path, tmp_path: Path, suffix: str, magic:
     assert output.read_bytes().startswith(magic)
 
 
-@pytest.mark.parametrize("renderer", ["flat", "gouraud", "path"])
+@pytest.mark.parametrize("renderer", ["flat", "gouraud", "vpl", "path"])
 def test_every_renderer_sees_the_lamp_as_it_is(scene: Path, tmp_path: Path, renderer: str) -> None:
     image = linear(scene, tmp_path, "--renderer", renderer, "--camera", "from_below", "--samples", "4")
     assert image.shape == (10, 12, 3)
@@ -167,7 +167,7 @@ def told(result: Result, code: int) -> str:
         ({"objects": [SCENE["objects"][0]] * 2}, "objects.1.id: an object with id 'floor' exists already"),
     ],
 )
-@pytest.mark.parametrize("renderer", ["gouraud", "path"])
+@pytest.mark.parametrize("renderer", ["gouraud", "vpl", "path"])
 def test_a_bad_scene_is_refused_by_field(
     tmp_path: Path, change: dict[str, Any], expected: str, renderer: str
 ) -> None:
