@@ -12,11 +12,15 @@ from typing import Final
 import numpy as np
 
 from solver.engine.world import World
-from solver.illumination.particles.lighting import ShiningLights
-from solver.illumination.particles.receivers import Polygons
+from solver.illumination.particles.images import FoldedLights, ShiningImages, look_through
+from solver.illumination.particles.light_lobes import Gloss
+from solver.illumination.particles.lighting import ShiningLights, add_light
+from solver.illumination.particles.mirrors import mirror_images
+from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.illumination.particles.sights import Sights, look_around
 from solver.illumination.particles.thinning import PATHS, thinned
 from solver.illumination.particles.walk import ParticleWalk
+from solver.types import Float32Array
 
 FIRST: Final = 8
 """Paths of a first block."""
@@ -49,12 +53,15 @@ def first_path(number: int) -> int:
 
 
 class LightBlock:
-    """The lights of one block, in an order that has nothing to do with where they are."""
+    """The lights of one block, in an order that has nothing to do with where they are, and their images."""
 
-    def __init__(self, paths: int, lights: ShiningLights) -> None:
+    def __init__(self, paths: int, lights: ShiningLights, images: ShiningImages) -> None:
         self.paths = paths
         self.lights = lights
+        self.images = images
         self.sights: list[Sights | None] = [None] * -(-len(lights) // BATCH)
+        self.folded: list[FoldedLights | None] = [None] * len(self.sights)
+        """Of batches whose sights are kept and whose lights have images"""
 
     @property
     def is_kept(self) -> bool:
@@ -89,10 +96,11 @@ class LightBlocks:
             lights = thinned(walked, surfaces, paths, self._seed)
             order = np.random.default_rng((self._seed, number)).permutation(len(lights)).astype(np.int32)
             lights = lights.take(order)
-            shining = ShiningLights.of(
-                self.polygons, lights.position, lights.normal, lights.power, lights.lobe
+            shining = ShiningLights.all_of(self.polygons, lights)
+            images = mirror_images(lights, surfaces, len(lights), number)
+            self._blocks[number] = LightBlock(
+                paths, shining, ShiningImages.of(self.polygons, shining, images)
             )
-            self._blocks[number] = LightBlock(paths, shining)
             self.light_count += len(shining)
         return self._blocks[number]
 
@@ -105,12 +113,43 @@ class LightBlocks:
 
     def sights(self, block: LightBlock, batch: int) -> Sights:
         """What the lights of a batch see."""
+        return self._look(block, batch)[0]
+
+    def shine(
+        self,
+        light: Float32Array,
+        receivers: Receivers,
+        block: LightBlock,
+        batch: int,
+        bound: float,
+        factor: float = 1.0,
+        gloss: Gloss | None = None,
+    ) -> None:
+        """Add to `light` (3, n) W/m2 what a batch and its images give, `factor` times as strong.
+
+        `bound` and `gloss` are those of `add_light`.
+        """
+        sights, folded = self._look(block, batch)
+        add_light(light, receivers, block.batch(batch, factor), sights, bound, None, gloss)
+        if folded is not None:
+            images = folded.scaled(factor)
+            add_light(light, receivers, images.lights, images.sights, bound, images.folds, gloss)
+
+    def _look(self, block: LightBlock, batch: int) -> tuple[Sights, FoldedLights | None]:
+        """What the lights of a batch see, and their images."""
         known = block.sights[batch]
         if known is not None:
-            return known
-        frames = block.batch(batch).frames
-        found = look_around(self.world.rays, self.polygons, frames, self._resolution)
-        if self._bytes + found.nbytes <= SIGHT_BYTES:
-            self._bytes += found.nbytes
-            block.sights[batch] = found
-        return found
+            return known, block.folded[batch]
+        lights = block.batch(batch)
+        rays, polygons = self.world.rays, self.polygons
+        sights = look_around(rays, polygons, lights.frames, self._resolution)
+        images = block.images.part(batch * BATCH, (batch + 1) * BATCH)
+        folded = look_through(rays, polygons, lights, sights, images) if len(images) > 0 else None
+        taken = sights.nbytes
+        if folded is not None:
+            # Both have the maps of the lights: once is enough.
+            sights, taken = folded.sights.part(0, len(lights)), folded.nbytes
+        if self._bytes + taken <= SIGHT_BYTES:
+            self._bytes += taken
+            block.sights[batch], block.folded[batch] = sights, folded
+        return sights, folded

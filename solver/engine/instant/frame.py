@@ -10,18 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
+from solver.engine.instant.image import Image, joined
+from solver.engine.instant.points import GlossyPoints, LitPoints, matched
 from solver.geometry.scene import Camera
-from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.compensation import Known, NearbyLight
-from solver.illumination.particles.lighting import add_light
+from solver.illumination.particles.glossy import GlossyLight
+from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.receivers import Receivers
 from solver.rendering.surface_points import SurfacePoints
-from solver.types import LUMINANCE_WEIGHTS, BoolArray, Float32Array, FloatArray
+from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, Int64Array
+
+T = TypeVar("T", bound=np.generic)
 
 PATHS_PER_RAY: Final = 32
 """Paths of a block for each ray that a pixel sends to what is near."""
@@ -32,9 +37,6 @@ _HELPERS: Final = 4
 _AT_ONCE: Final = 1 << 15
 """Rays to what is near between two yields."""
 
-_SAME: Final = 1e-9
-"""Points nearer than this times the scene's size are the same."""
-
 
 @dataclass(frozen=True)
 class InstantSettings:
@@ -44,29 +46,6 @@ class InstantSettings:
     """Of cos cos' / r^2, with lengths in diameters of the scene; may be infinite"""
     compensates: bool
     """Whether what the bound takes away is put back"""
-
-
-@dataclass(eq=False)
-class _Image:
-    """Irradiance W/m2 at the points of a frame, by one block or by several."""
-
-    light: list[Float32Array]
-    """(3, n) of the points of each sample"""
-    valid: list[BoolArray]
-    """(n,) of each sample"""
-    is_new: bool
-    """Whether it is of the scene as it stands"""
-    paths: int
-
-    @classmethod
-    def dark(cls, points: list[SurfacePoints], paths: int) -> _Image:
-        """No light, which is known everywhere."""
-        return cls(
-            [np.zeros((3, len(p)), dtype=np.float32) for p in points],
-            [np.ones(len(p), dtype=np.bool_) for p in points],
-            True,
-            paths,
-        )
 
 
 class InstantFrame:
@@ -90,16 +69,19 @@ class InstantFrame:
         """Counts the changes of the picture."""
         self._blocks = blocks
         self._settings = settings
-        self._points = points
         self._known = known
-        self._receivers = [Receivers.on(blocks.polygons, p.position, p.patch) for p in points]
-        self._stream = [p.pixel.astype(np.int64) * len(points) + k for k, p in enumerate(points)]
-        self._ring: list[_Image | None] = [None] * RING
-        self._rest: _Image | None = None
+        world, pixels = blocks.world, camera.width * camera.height
+        self._points = [LitPoints.of(p, camera, world) for p in points]
+        self._glossy = [GlossyPoints.of(p, world, blocks.polygons) for p in self._points]
+        self._receivers = [Receivers.on(blocks.polygons, p.position, p.patch) for p in self._points]
+        self._stream = [p.keys(pixels) * len(points) + k for k, p in enumerate(self._points)]
+        self._ring: list[Image | None] = [None] * RING
+        self._rest: Image | None = None
         self._spread = 0.0
         self._judged = 0
         self._estimate = 1.0
         self._turn = 0
+        self._lobe_turn = 0
         if before is not None:
             self._take_over(before)
         self._work = self._run()
@@ -136,31 +118,39 @@ class InstantFrame:
     # --- the picture ---------------------------------------------------------------------------------
 
     def irradiance(self) -> FloatArray:
-        """(h, w, 3) W/m2, the mean over the samples of each pixel; 0 where nothing is seen."""
-        return self._gathered([light.T.astype(np.float64) for light in self._mean(self._images())])
+        """(h, w, 3) W/m2, the mean over the samples of each pixel; 0 where nothing is seen.
+
+        It is that of the surfaces that pixels show themselves: of a mirror, what falls on the mirror.
+        """
+        seen = zip(self._points, self._mean(self._images()), strict=True)
+        return self._gathered(
+            [np.where(p.depth[:, None] == 0, light.T.astype(np.float64), 0.0) for p, light in seen]
+        )
 
     def radiance(self) -> FloatArray:
         """(h, w, 3) W/(m2 sr)."""
-        surfaces = self._blocks.world.surfaces
-        seen = zip(self._points, self._mean(self._images()), strict=True)
-        return self._gathered(
-            [
-                _emitted(surfaces, self.camera, points) + surfaces.reflectance[points.patch] * light.T / np.pi
-                for points, light in seen
-            ]
-        )
+        world = self._blocks.world
+        surfaces, images = world.surfaces, self._images()
+        values = []
+        for points, glossy, light, gloss in zip(
+            self._points, self._glossy, self._mean(images), self._mean_gloss(images), strict=True
+        ):
+            value = points.emitted(world) + surfaces.reflectance[points.patch] * light.T / np.pi
+            value[glossy.row] += surfaces.specular[points.patch[glossy.row]] * gloss.T / np.pi
+            values.append(points.weight * value)
+        return self._gathered(values)
 
     def _gathered(self, values: list[FloatArray]) -> FloatArray:
         width, height = self.camera.width, self.camera.height
         pixel = np.concatenate([points.pixel for points in self._points])
-        joined = np.concatenate(values)
-        image = [np.bincount(pixel, joined[:, c], width * height) for c in range(3)]
+        value = np.concatenate(values)
+        image = [np.bincount(pixel, value[:, c], width * height) for c in range(3)]
         return np.stack(image, axis=1).reshape(height, width, 3) / len(self._points)
 
-    def _images(self) -> list[_Image]:
+    def _images(self) -> list[Image]:
         return [image for image in (*self._ring, self._rest) if image is not None]
 
-    def _mean(self, images: list[_Image]) -> list[Float32Array]:
+    def _mean(self, images: list[Image]) -> list[Float32Array]:
         """Irradiance (3, n) of each sample, of each image by its paths where it is valid."""
         means = []
         for sample, points in enumerate(self._points):
@@ -173,6 +163,19 @@ class InstantFrame:
             means.append(np.asarray(total / np.maximum(weight, 1.0), dtype=np.float32))
         return means
 
+    def _mean_gloss(self, images: list[Image]) -> list[Float32Array]:
+        """The same of the glossy points (3, g), by their lobes."""
+        means = []
+        for sample, glossy in enumerate(self._glossy):
+            total = glossy.dark()
+            weight = np.zeros(len(glossy), dtype=np.float32)
+            for image in images:
+                share = np.float32(image.paths) * image.valid[sample][glossy.row]
+                total += share * image.gloss[sample]
+                weight += share
+            means.append(np.asarray(total / np.maximum(weight, 1.0), dtype=np.float32))
+        return means
+
     # --- the work ------------------------------------------------------------------------------------
 
     def _run(self) -> Iterator[None]:
@@ -180,50 +183,66 @@ class InstantFrame:
         while True:
             replaced = self._ring[number] if number < RING else None
             if replaced is None or not replaced.is_new:
-                image = _Image.dark(self._points, block_paths(number))
+                image = Image.dark(self._points, self._glossy, block_paths(number))
                 yield from self._shine(image, number)
                 self._judge(image)
                 if number < RING:
                     self._ring[number] = image
                 else:
-                    self._rest = image if self._rest is None else _joined(self._rest, image)
+                    self._rest = image if self._rest is None else joined(self._rest, image)
                 self.version += 1
                 yield
             number += 1
 
-    def _shine(self, image: _Image, number: int) -> Iterator[None]:
+    def _shine(self, image: Image, number: int) -> Iterator[None]:
         """Collect the light of a block."""
         samples = len(self._points)
         block = self._blocks.block(number)
         yield
+        bound = self._settings.bound
         for batch in range(len(block.sights)):
-            sights = self._blocks.sights(block, batch)
+            self._blocks.sights(block, batch)
             yield
             # Each sample has its share of the batches, as much stronger: a pixel has all.
             sample = (batch + number) % samples
-            lights = block.batch(batch, samples)
-            add_light(image.light[sample], self._receivers[sample], lights, sights, self._settings.bound)
+            self._blocks.shine(image.light[sample], self._receivers[sample], block, batch, bound, samples)
+            glossy = self._glossy[sample]
+            if len(glossy.broad) > 0:
+                light = np.zeros((3, len(glossy.broad)), dtype=np.float32)
+                self._blocks.shine(light, glossy.receivers, block, batch, bound, samples, glossy.gloss)
+                image.gloss[sample][:, glossy.broad] += light
             yield
-        if self._settings.compensates and np.isfinite(self._settings.bound):
-            yield from self._compensate(image, block)
+        near = self._nearby(block)
+        if np.isfinite(near.bound):
+            yield from self._compensate(image, block, near)
+        if any(len(glossy.narrow) > 0 for glossy in self._glossy):
+            yield from self._send_lobes(image, block, near)
 
-    def _compensate(self, image: _Image, block: LightBlock) -> Iterator[None]:
-        """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples."""
+    def _nearby(self, block: LightBlock) -> NearbyLight:
+        """What rays of a block come upon, and what its lights leave out."""
         world, bound = self._blocks.world, self._settings.bound
         helper = self._blocks.kept(block)
-
         batches = len(helper.sights)
 
-        def shine(receivers: Receivers, turn: int) -> Float32Array:
+        def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
             # Other lights each time, so that in the mean all of them shine there.
             light = np.zeros((3, len(receivers)), dtype=np.float32)
             for k in range(min(_HELPERS, batches)):
                 batch = (turn * _HELPERS + k) % batches
-                lights = helper.batch(batch, max(1.0, batches / _HELPERS))
-                add_light(light, receivers, lights, self._blocks.sights(helper, batch), bound)
+                factor = max(1.0, batches / _HELPERS)
+                self._blocks.shine(light, receivers, helper, batch, bound, factor, gloss)
             return light
 
-        near = NearbyLight(world.surfaces, self._blocks.polygons, world.rays, bound, shine, self._known())
+        def shine(receivers: Receivers, turn: int) -> Float32Array:
+            return polish(receivers, None, turn)
+
+        surfaces, polygons = world.surfaces, self._blocks.polygons
+        glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
+        bound = bound if self._settings.compensates else np.inf
+        return NearbyLight(surfaces, polygons, world.rays, bound, shine, self._known(), glossy)
+
+    def _compensate(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
+        """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples."""
         rays = max(1, round(block.paths / (PATHS_PER_RAY * len(self._points))))
         every = max(1, round(PATHS_PER_RAY * len(self._points) / block.paths))
         for sample, points in enumerate(self._points):
@@ -233,18 +252,40 @@ class InstantFrame:
                 for first in range(0, len(asked), _AT_ONCE):
                     part = asked[first : first + _AT_ONCE]
                     stream = self._stream[sample][part]
-                    found = near.at(points.position[part], points.patch[part], stream, turn)
-                    image.light[sample][:, part] += np.float32(every / rays) * found
+                    found, along = near.sample(points.position[part], points.patch[part], stream, turn)
+                    found *= np.float32(every / rays)
+                    image.light[sample][:, part] += found
+                    self._glossy[sample].add_sampled(image.gloss[sample], part, found, along)
                     yield
         self._turn += rays
 
-    def _judge(self, fresh: _Image) -> None:
+    def _send_lobes(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
+        """Find the light of narrow lobes by rays: as many as go to what is near, at least one for a point."""
+        if near.glossy is None:
+            return
+        rays = max(1, round(block.paths / (PATHS_PER_RAY * len(self._points))))
+        for sample, points in enumerate(self._points):
+            glossy = self._glossy[sample]
+            for ray in range(rays):
+                for first in range(0, len(glossy.narrow), _AT_ONCE):
+                    part = glossy.narrow[first : first + _AT_ONCE]
+                    row = glossy.row[part]
+                    found = near.glossy.by_rays(
+                        near, points.position[row], points.patch[row], glossy.axis[part],
+                        self._stream[sample][row], self._lobe_turn + ray,
+                    )  # fmt: skip
+                    image.gloss[sample][:, part] += found / rays
+                    yield
+        self._lobe_turn += rays
+
+    def _judge(self, fresh: Image) -> None:
         """Learn from how a new image differs from those before."""
         images = [image for image in self._images() if image.is_new]
         if not images:
             return
         before = sum(image.paths for image in images)
-        known, new = self._reflected(self._mean(images)), self._reflected(fresh.light)
+        known = self._reflected(self._mean(images), self._mean_gloss(images))
+        new = self._reflected(fresh.light, fresh.gloss)
         after = before + fresh.paths
         apart = float(np.mean((known - new) ** 2)) * before * fresh.paths / after
         self._spread += fresh.paths * apart
@@ -254,53 +295,42 @@ class InstantFrame:
         squared = self._spread / self._judged / after
         self._estimate = min(1.0, float(np.sqrt(squared / power))) if power > 0.0 else 0.0
 
-    def _reflected(self, light: list[Float32Array]) -> FloatArray:
+    def _reflected(self, light: list[Float32Array], gloss: list[Float32Array]) -> FloatArray:
         """Luminance (h w,) of what pixels reflect."""
-        weights = self._blocks.world.surfaces.reflectance * LUMINANCE_WEIGHTS
-        seen = zip(self._points, light, strict=True)
-        values = np.concatenate([np.einsum("nc,cn->n", weights[p.patch], part) for p, part in seen])
+        surfaces = self._blocks.world.surfaces
+        matt, shiny = surfaces.reflectance * LUMINANCE_WEIGHTS, surfaces.specular * LUMINANCE_WEIGHTS
+        values = []
+        for points, glossy, part, lobes in zip(self._points, self._glossy, light, gloss, strict=True):
+            value = np.einsum("nc,cn->n", points.weight * matt[points.patch], part)
+            row = glossy.row
+            value[row] += np.einsum("nc,cn->n", points.weight[row] * shiny[points.patch[row]], lobes)
+            values.append(value)
         pixel = np.concatenate([points.pixel for points in self._points])
-        return np.asarray(np.bincount(pixel, values, self.camera.width * self.camera.height), np.float64)
+        seen = np.bincount(pixel, np.concatenate(values), self.camera.width * self.camera.height)
+        return np.asarray(seen, np.float64)
 
     def _take_over(self, before: InstantFrame) -> None:
         """Let the mean of `before` stand in for all images that are not there yet."""
         images = before._images()
         if not images:
             return
-        light, valid = [], []
-        size = self._blocks.world.surfaces.size
-        for sample, (mine, mean) in enumerate(zip(self._points, before._mean(images), strict=True)):
-            theirs = before._points[sample]
-            at = np.full(self.camera.width * self.camera.height, -1, dtype=np.int32)
-            at[theirs.pixel] = np.arange(len(theirs), dtype=np.int32)
-            source = at[mine.pixel]
-            same = source >= 0
-            normal = self._blocks.world.surfaces.normal[mine.patch]
-            other = before._blocks.world.surfaces.normal[theirs.patch[source]]
-            apart = np.abs(mine.position - theirs.position[source]).max(axis=1)
-            same &= (apart <= _SAME * size) & (np.abs(normal - other).max(axis=1) <= _SAME)
+        light, gloss, valid = [], [], []
+        means, lobes = before._mean(images), before._mean_gloss(images)
+        pixels = self.camera.width * self.camera.height
+        for sample, mine in enumerate(self._points):
+            theirs, lobed = before._points[sample], self._glossy[sample].row
+            source, same = matched(mine, theirs, self._blocks.world, before._blocks.world, pixels)
             known = np.logical_or.reduce([image.valid[sample] for image in images])
-            same &= known[source]
-            light.append(np.where(same, mean[:, source], np.float32(0.0)))
+            same &= _picked(known[None], source)[0]
+            mirrored, same = before._glossy[sample].matched(self._glossy[sample], source, same)
+            light.append(np.where(same, _picked(means[sample], source), np.float32(0.0)))
+            gloss.append(np.where(same[lobed], _picked(lobes[sample], mirrored), np.float32(0.0)))
             valid.append(same)
-        self._ring = [_Image(light, valid, False, FIRST) for _ in range(RING)]
+        self._ring = [Image(light, gloss, valid, False, FIRST) for _ in range(RING)]
 
 
-def _joined(a: _Image, b: _Image) -> _Image:
-    """Two images, valid everywhere, as one."""
-    paths = a.paths + b.paths
-    share = np.float32(b.paths / paths)
-    light = [x + share * (y - x) for x, y in zip(a.light, b.light, strict=True)]
-    return _Image(light, a.valid, True, paths)
-
-
-def _emitted(surfaces: Surfaces, camera: Camera, points: SurfacePoints) -> FloatArray:
-    """Radiance (n, 3) W/(m2 sr) that points emit towards the camera."""
-    exponent = surfaces.emission_exponent[points.patch]
-    radiance = surfaces.emission[points.patch] / np.pi
-    if exponent.any():
-        towards = camera.eye - points.position
-        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-        cosine = np.maximum(np.einsum("na,na->n", towards, surfaces.normal[points.patch]), 0.0)
-        radiance = radiance * (0.5 * (exponent + 2.0) * cosine**exponent)[:, None]
-    return np.asarray(radiance)
+def _picked(values: NDArray[T], index: Int64Array) -> NDArray[T]:
+    """Columns of values (c, n); 0 where there are none."""
+    if values.shape[1] == 0:
+        return np.zeros((len(values), len(index)), dtype=values.dtype)
+    return values[:, index]

@@ -132,7 +132,10 @@ class InstantFrames:
             bound=1.0 / reach**2 if reach > 0.0 else math.inf,
             compensates=self._settings.vpl_compensation is not Compensation.NONE,
         )
-        uses_solution = self._settings.vpl_compensation is Compensation.SOLUTION
+        surfaces = world.surfaces
+        # A solution has diffuse light alone.
+        is_diffuse = not (surfaces.has_specular or surfaces.has_directional_emission)
+        uses_solution = is_diffuse and self._settings.vpl_compensation is Compensation.SOLUTION
         known = self._known if uses_solution else _nothing
         return InstantFrame(self._blocks, settings, camera, points, known, before)
 

@@ -19,7 +19,9 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.illumination.particles.glossy import GlossyLight, lobe_axis
 from solver.illumination.particles.hemisphere import tangent_frames
+from solver.illumination.particles.mirror_ways import Ends, follow, is_glossy
 from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.kernels import kernel
 from solver.types import Float32Array, FloatArray, Int64Array, IntArray, Points
@@ -52,7 +54,9 @@ class NearbyLight:
     """Of cos cos' / r^2 with lengths in diameters of the scene"""
     shine: Shine
     known: Known | None
-    """Where given, reflected light is this solution's"""
+    """Where given, reflected light is this solution's: of scenes that are diffuse"""
+    glossy: GlossyLight | None = None
+    """What lobes reflect; None where nothing is glossy"""
 
     def at(
         self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int = 0
@@ -61,39 +65,62 @@ class NearbyLight:
 
         Means over `turn` = 0, 1, ... converge evenly for points of one `stream` (n,) >= 0.
         """
+        return self.sample(positions, patch, stream, turn, bounce)[0]
+
+    def sample(
+        self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int = 0
+    ) -> tuple[Float32Array, FloatArray]:
+        """The same, with the directions (n, 3) of the rays.
+
+        Lights are bounded by the way from their images too: rays go on at mirrors for as far as they reach.
+        """
         added = np.zeros((3, len(patch)), dtype=np.float32)
-        if len(patch) == 0 or not np.isfinite(self.bound) or bounce == _BOUNCES:
-            return added
         s = self.surfaces
+        if len(patch) == 0 or not np.isfinite(self.bound) or bounce >= _BOUNCES:
+            return added, s.normal[patch]
         directions = _directions(s.normal[patch], stream, turn, bounce)
         reach = s.size / np.sqrt(self.bound)
         # Away from the surface, so that no ray meets it again.
         start = positions + (self.rays.offset / self.rays.scale) * s.normal[patch]
-        hits = self.rays.intersect(start, directions, reach)
-        found = np.flatnonzero(hits.triangle >= 0).astype(np.int32)
-        triangle, along, distance = hits.triangle[found], directions[found], hits.distance[found]
-        normal = s.normal[s.triangle_patch[triangle, 0]]
-        falling = np.einsum("na,na->n", along, normal)
-        met = np.where(falling < 0.0, s.triangle_patch[triangle, 0], s.triangle_patch[triangle, 1])
-        there = np.abs(falling)
-        here = np.einsum("na,na->n", along, s.normal[patch[found]])
-        kernel_value = here * there * (s.size / np.maximum(distance, 1e-30)) ** 2
+        ends = follow(s, self.rays, start, directions, reach)
+        here = np.einsum("na,na->n", directions[ends.row], s.normal[patch[ends.row]])
+        there = np.abs(np.einsum("na,na->n", ends.along, s.normal[ends.patch]))
+        kernel_value = here * there * (s.size / np.maximum(ends.distance, 1e-30)) ** 2
         share = np.maximum(1.0 - self.bound / np.maximum(kernel_value, 1e-30), 0.0)
-        chosen = np.flatnonzero((met >= 0) & (share > 0.0))
-        found, met, share, there = found[chosen], met[chosen].astype(np.int32), share[chosen], there[chosen]
-        places = start[found] + directions[found] * distance[chosen, None]
+        chosen = np.flatnonzero(share > 0.0)
+        ends, share = ends.take(chosen), share[chosen]
+        light = share[:, None] * ends.weight * self.leaving(ends, stream[ends.row], turn, bounce)
+        for depth in range(int(ends.depth.max(initial=0)) + 1):
+            rows = np.flatnonzero(ends.depth == depth)
+            added[:, ends.row[rows]] += light[rows].T
+        return added, directions
+
+    def leaving(self, ends: Ends, stream: Int64Array, turn: int, bounce: int) -> FloatArray:
+        """pi times the radiance (k, 3) of what rays come upon, but for the mirrors on their way."""
+        s, met = self.surfaces, ends.patch
+        there = np.abs(np.einsum("na,na->n", ends.along, s.normal[met]))
         lobe = 0.5 * (s.emission_exponent[met] + 2.0) * there ** s.emission_exponent[met]
         light = s.emission[met] * lobe[:, None]
         lit = np.flatnonzero(s.reflectance[met].any(axis=1)).astype(np.int32)
         light[lit] += s.reflectance[met[lit]] * self._irradiance(
-            places[lit], met[lit], stream[found[lit]], turn, bounce
+            ends.position[lit], met[lit], stream[lit], turn, bounce
         )
-        added[:, found] = (share[:, None] * light).T
-        return added
+        if self.glossy is not None:
+            lobed = np.flatnonzero(is_glossy(s, met))
+            axis = lobe_axis(s, met[lobed], ends.along[lobed])
+            light[lobed] += (
+                s.specular[met[lobed]]
+                * self.glossy.at(
+                    self, ends.position[lobed], met[lobed], axis, stream[lobed], turn, bounce + 1
+                ).T
+            )
+        return np.asarray(light)
 
     def _irradiance(
         self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int
     ) -> FloatArray:
+        if len(patch) == 0:
+            return np.empty((0, 3))
         if self.known is not None:
             return self.known(positions, patch)
         lit = self.shine(Receivers.on(self.polygons, positions, patch), turn)

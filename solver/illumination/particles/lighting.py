@@ -15,18 +15,25 @@ from typing import Final
 
 import numpy as np
 
+from solver.illumination.particles.folds import Folds, first_of, is_hidden_on_the_way, passes_by, trim
 from solver.illumination.particles.hemisphere import tangent_frames
+from solver.illumination.particles.hiding import is_hidden
+from solver.illumination.particles.light_lobes import Gloss, polish, shape
+from solver.illumination.particles.lights import VirtualLights
 from solver.illumination.particles.receivers import Polygons, Receivers, local
 from solver.illumination.particles.sights import Sights, Texels
 from solver.kernels import inline_kernel, kernel
 from solver.parallel import run_chunks
 from solver.tolerances import TOUCH
-from solver.types import Float32Array, FloatArray, IntArray, Points
+from solver.types import Float32Array, FloatArray, Int64Array, IntArray, Points
 
 BLOCK: Final = 256
 """Receivers lit together: their terms stay in the first-level cache."""
 
 _CHUNK: Final = 8 * BLOCK
+
+_LEAST_GLOSS: Final = 2.0**-20
+"""Exponents of lobes below this are taken for it: it tells them from no lobe."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +41,27 @@ class ShiningLights:
     """m lights as the kernel takes them."""
 
     frames: Float32Array
-    """(12, m) local position, unit normal, and two tangents"""
+    """(15, m) local position, unit normal, two tangents, and the axis of the lobe: the normal, but for
+    glossy lights, which have the mirrored direction there"""
     power: Float32Array
     """(m, 3) local: W over pi and the squared size of the scene, W/m2"""
     lobe: Float32Array
-    """(m,) exponent of the cosine that intensity goes by, 1 for Lambert's"""
+    """(m,) k: intensity goes by the cosine to the normal, and by cos^(k - 1) to the axis; 1 is Lambert's"""
 
     @classmethod
     def of(
-        cls, polygons: Polygons, position: Points, normal: FloatArray, power: FloatArray, lobe: FloatArray
+        cls,
+        polygons: Polygons,
+        position: Points,
+        normal: FloatArray,
+        power: FloatArray,
+        lobe: FloatArray,
+        axis: FloatArray | None = None,
     ) -> ShiningLights:
-        """Lights at world `position` (m, 3) of `power` (m, 3) W."""
+        """Lights at world `position` (m, 3) of `power` (m, 3) W, with lobes about `axis`, or the normal."""
         tangent, other = tangent_frames(normal)
-        frames = np.concatenate([local(polygons.surfaces, position), normal, tangent, other], axis=1).T
+        axis = normal if axis is None else axis
+        frames = np.concatenate([local(polygons.surfaces, position), normal, tangent, other, axis], axis=1).T
         scale = 0.5 * (lobe + 1.0) / (np.pi * polygons.surfaces.size**2)
         return cls(
             np.ascontiguousarray(frames, dtype=np.float32),
@@ -54,8 +69,27 @@ class ShiningLights:
             lobe.astype(np.float32),
         )
 
+    @classmethod
+    def all_of(cls, polygons: Polygons, lights: VirtualLights) -> ShiningLights:
+        """`lights`, glossy ones by their gloss; images by where they are, not by what they shine through."""
+        along = np.einsum("ma,ma->m", lights.incident, lights.normal)
+        mirrored = lights.incident - 2.0 * along[:, None] * lights.normal
+        glossy = lights.gloss >= 0.0
+        # A lobe of n = 0 ends at a right angle to its axis, which Lambert's does not.
+        lobe = np.where(glossy, 1.0 + np.maximum(lights.gloss, _LEAST_GLOSS), lights.lobe)
+        axis = np.where(glossy[:, None], mirrored, lights.normal)
+        return cls.of(polygons, lights.position, lights.normal, lights.power, lobe, axis)
+
     def __len__(self) -> int:
         return len(self.lobe)
+
+    def take(self, rows: Int64Array, factor: float = 1.0) -> ShiningLights:
+        """Those with the indices `rows`, `factor` times as strong."""
+        return ShiningLights(
+            np.ascontiguousarray(self.frames[:, rows]),
+            np.float32(factor) * self.power[rows],
+            self.lobe[rows],
+        )
 
     def part(self, first: int, last: int, factor: float = 1.0) -> ShiningLights:
         """The lights [first, last), `factor` times as strong."""
@@ -72,15 +106,20 @@ def add_light(
     lights: ShiningLights,
     sights: Sights,
     bound: float,
+    folds: Folds | None = None,
+    gloss: Gloss | None = None,
 ) -> None:
     """Add to `irradiance` (3, n) W/m2 what `lights` give to `receivers` that their `sights` do not hide.
 
-    `bound` is local: of cos cos' / r^2 with lengths in diameters of the scene; infinite for none.
+    `bound` is local: of cos cos' / r^2 with lengths in diameters of the scene; infinite for none. With
+    `folds` only the images among the lights shine. With `gloss` light counts by (n + 2) / 2 cos^n of the
+    angle to the lobe's axis: over pi, and times rho_s, it is the radiance that lobes reflect to their eyes.
     """
     run_chunks(
         lambda start, stop: _light(
             start, stop, receivers.frame, receivers.polygon, lights.frames, lights.power, lights.lobe,
             sights.texels, sights.start, sights.polygon, sights.cone, np.float32(bound), irradiance,
+            folds, gloss,
         ),
         len(receivers),
         _CHUNK,
@@ -102,7 +141,10 @@ def _light(
     cone: Float32Array,
     bound: np.float32,
     irradiance: Float32Array,
+    folds: Folds | None,
+    gloss: Gloss | None,
 ) -> None:
+    # What a scene has not is None, which is a type to the compiler: its branches are not made.
     gain = np.empty(BLOCK, dtype=np.float32)
     texel = np.empty(BLOCK, dtype=np.int32)
     unclear = np.empty(BLOCK, dtype=np.int32)
@@ -118,7 +160,7 @@ def _light(
         own = polygon[first:last]
         red, green, blue = irradiance[0, first:last], irradiance[1, first:last], irradiance[2, first:last]
         is_flat = _bounds(receivers, first, last, low, high)
-        for k in range(lights.shape[1]):
+        for k in range(first_of(folds), lights.shape[1]):
             # Whole blocks behind the light, or with the light behind them.
             reach = zero
             for axis in range(3):
@@ -131,9 +173,15 @@ def _light(
                 <= zero
             ):
                 continue
+            if passes_by(low, high, lights, k, folds):
+                continue
             _receive(x, y, z, nx, ny, nz, lights, k, bound, size, gain, texel)
             if lobe[k] != np.float32(1.0):
-                _shape(x, y, z, lights, k, lobe[k], gain)
+                shape(x, y, z, lights, k, lobe[k], gain)
+            if folds is not None:
+                trim(x, y, z, lights, k, folds, gain)
+            if gloss is not None:
+                polish(x, y, z, lights, k, gloss, first, gain)
             # Who does not see the light for certain, and then whether they do.
             sight = texels[k].reshape(size * size)
             base = sight_start[k]
@@ -143,14 +191,22 @@ def _light(
                 q = sight[at]
                 same = q == sight[at + 1] and q == sight[at + size] and q == sight[at + size + 1]
                 unclear[count] = i
-                count += not (same and seen[base + q] == own[i]) and gain[i] > zero
+                # What an image sees does not tell all of its light's way.
+                count += not (same and seen[base + q] == own[i] and folds is None) and gain[i] > zero
             for j in range(count):
                 i = unclear[j]
                 at = texel[i]
-                if _is_hidden(
-                    x[i], y[i], z[i], x[i] - lights[0, k], y[i] - lights[1, k], z[i] - lights[2, k], own[i],
-                    base, sight[at], sight[at + 1], sight[at + size], sight[at + size + 1], seen, cone,
-                ):  # fmt: skip
+                if folds is None:
+                    hidden = is_hidden(
+                        x[i], y[i], z[i], x[i] - lights[0, k], y[i] - lights[1, k], z[i] - lights[2, k],
+                        own[i], base, sight[at], sight[at + 1], sight[at + size], sight[at + size + 1],
+                        seen, cone, None,
+                    )  # fmt: skip
+                else:
+                    hidden = is_hidden_on_the_way(
+                        x[i], y[i], z[i], own[i], lights, k, at, texels, sight_start, seen, cone, folds
+                    )
+                if hidden:
                     gain[i] = zero
             r, g, b = power[k, 0], power[k, 1], power[k, 2]
             for i in range(n):
@@ -214,65 +270,3 @@ def _receive(
         column = min(max((s + t) * scale + shift, zero), most)
         row = min(max((s - t) * scale + shift, zero), most)
         texel[i] = np.int32(row) * np.int32(size) + np.int32(column)
-
-
-@inline_kernel
-def _shape(
-    x: Float32Array,
-    y: Float32Array,
-    z: Float32Array,
-    lights: Float32Array,
-    k: int,
-    lobe: np.float32,
-    gain: Float32Array,
-) -> None:
-    """Let a light shine by a power of the cosine, of which Lambert's is in `gain` (n,)."""
-    for i in range(len(x)):
-        dx, dy, dz = x[i] - lights[0, k], y[i] - lights[1, k], z[i] - lights[2, k]
-        square = dx * dx + dy * dy + dz * dz
-        there = lights[3, k] * dx + lights[4, k] * dy + lights[5, k] * dz
-        if there > np.float32(0.0):
-            gain[i] *= (there / np.sqrt(square)) ** (lobe - np.float32(1.0))
-
-
-@inline_kernel
-def _is_hidden(
-    x: np.float32,
-    y: np.float32,
-    z: np.float32,
-    dx: np.float32,
-    dy: np.float32,
-    dz: np.float32,
-    own: int,
-    base: int,
-    q0: int,
-    q1: int,
-    q2: int,
-    q3: int,
-    seen: IntArray,
-    cone: Float32Array,
-) -> bool:
-    """Whether the line (dx, dy, dz) from a light to a receiver crosses one of the polygons seen around it."""
-    # No views of rows: threads would contend for their counts of references. Few branches: none is foreseen.
-    before = -1
-    for corner in range(4):
-        texel = q0 if corner == 0 else q1 if corner == 1 else q2 if corner == 2 else q3
-        if texel == before:
-            continue
-        before = texel
-        q = base + texel
-        behind = cone[q, 12] * x + cone[q, 13] * y + cone[q, 14] * z - cone[q, 15]
-        if behind > np.float32(TOUCH) and seen[q] != own:
-            inside = min(
-                min(
-                    cone[q, 0] * dx + cone[q, 1] * dy + cone[q, 2] * dz,
-                    cone[q, 3] * dx + cone[q, 4] * dy + cone[q, 5] * dz,
-                ),
-                min(
-                    cone[q, 6] * dx + cone[q, 7] * dy + cone[q, 8] * dz,
-                    cone[q, 9] * dx + cone[q, 10] * dy + cone[q, 11] * dz,
-                ),
-            )
-            if inside >= np.float32(0.0):
-                return True
-    return False

@@ -8,21 +8,27 @@ least. Here each light has its image in every mirror that it faces. Those are al
 no ray, and they weigh what the mirror reflects. Paths that hit mirrors go on (see `walk`), but leave nothing
 at them.
 
-What is left out is light that meets two mirrors one after the other last of all, before it gets to who asks:
-an image of an image. Glossy surfaces have no images; walks leave glossy lights at them.
+Light that meets several mirrors one after the other last of all comes from an image of an image, and these
+are made as well, to a depth. Glossy surfaces have no images; walks leave glossy lights at them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.particles.lights import VirtualLights
-from solver.types import LUMINANCE_WEIGHTS, BoolArray, Corners, FloatArray, Int64Array, Points
+from solver.illumination.particles.lights import VirtualLights, join
+from solver.types import LUMINANCE_WEIGHTS, BoolArray, Corners, FloatArray, Int64Array, IntArray, Points
+
+DEEPEST: Final = 4
+"""Mirrors in a row that an image is seen in, at most."""
+
+SLIGHTEST: Final = 1.0 / 16.0
+"""Images that send less than this times the mean power of a light are left out at random."""
 
 _MIRRORS: Final = 256
 """Mirrors that are asked at once: bounds what is held of all lights by all mirrors."""
@@ -31,6 +37,18 @@ _MIRRORS: Final = 256
 def mirrors_of(surfaces: Surfaces) -> Int64Array:
     """The patches (k,) that are perfect mirrors."""
     return np.flatnonzero(np.isinf(surfaces.exponent) & surfaces.specular.any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """k images of lights, those of lights proper first, and images of images after what they show."""
+
+    lights: VirtualLights
+    """(k)"""
+    source: Int64Array
+    """(k,) the light proper that is shown in the end"""
+    parent: Int64Array
+    """(k,) the image that is shown, before this one in the list; -1 for the light proper"""
 
 
 def mirrored_lights(
@@ -42,24 +60,94 @@ def mirrored_lights(
     mirror, and made as much stronger as they had been likely to be left out: what they add up to is right in
     the mean. Raises ValueError for lights that are images.
     """
+    return mirror_images(lights, surfaces, most, seed, deepest=1, slightest=0.0).lights
+
+
+def mirror_images(
+    lights: VirtualLights,
+    surfaces: Surfaces,
+    most: int | None = None,
+    seed: int = 0,
+    deepest: int = DEEPEST,
+    slightest: float = SLIGHTEST,
+) -> Images:
+    """As `mirrored_lights`, by up to `deepest` mirrors in a row.
+
+    Images that send less than `slightest` of the mean power of a light are as many, in the mean, as if they
+    had sent that much. Each depth has half as many images as the one before, at most: what mirrors show of
+    mirrors becomes less.
+    """
     if np.any(lights.mirror >= 0):
         raise ValueError("images have no images")
     mirrors = mirrors_of(surfaces)
+    total = float((lights.power @ LUMINANCE_WEIGHTS).sum())
+    least = slightest * total / max(1, len(lights))
+    random = np.random.default_rng(seed)
+    level, source = lights, np.arange(len(lights), dtype=np.int64)
+    before, found = 0, 0
+    images, sources, parents = [lights.take(source[:0])], [source[:0]], [source[:0]]
+    for depth in range(deepest):
+        shown, mirror = _pairs(level, surfaces, mirrors)
+        if len(shown) == 0:
+            break
+        likely = _likely(level, surfaces, shown, mirror, least, None if most is None else most >> depth)
+        chosen = _choose(likely, random)
+        shown, mirror = shown[chosen], mirror[chosen]
+        parents.append(shown + before if depth > 0 else np.full(len(shown), -1, dtype=np.int64))
+        source = source[shown]
+        level = _image(level.take(shown), surfaces, mirror, 1.0 / likely[chosen])
+        images.append(level)
+        sources.append(source)
+        before, found = found, found + len(level)
+    return Images(join(images, lights.paths), np.concatenate(sources), np.concatenate(parents))
+
+
+def _pairs(level: VirtualLights, surfaces: Surfaces, mirrors: Int64Array) -> tuple[Int64Array, Int64Array]:
+    """Lights and the mirrors that have images of them."""
     parts = [
-        _facing(lights, surfaces, mirrors[start : start + _MIRRORS])
+        _facing(level, surfaces, mirrors[start : start + _MIRRORS])
         for start in range(0, len(mirrors), _MIRRORS)
     ]
     none: Int64Array = np.empty(0, dtype=np.int64)
-    light = np.concatenate([none, *(part[0] for part in parts)])
+    shown = np.concatenate([none, *(part[0] for part in parts)])
     mirror = np.concatenate([none, *(part[1] for part in parts)])
-    factor = np.ones(len(light))
-    if most is not None and len(light) > most:
-        sent = np.einsum("mc,mc,c->m", lights.power[light], surfaces.specular[mirror], LUMINANCE_WEIGHTS)
-        sent *= _solid_angle(surfaces.corners[mirror] - lights.position[light, None])
-        likely = _likelihoods(sent, most)
-        chosen = _choose(likely, np.random.default_rng(seed))
-        light, mirror, factor = light[chosen], mirror[chosen], 1.0 / likely[chosen]
-    return _image(lights.take(light), surfaces, mirror, factor)
+    through = level.mirror[shown]
+    if len(shown) == 0 or through[0] < 0:
+        return shown, mirror
+    # An image shines through its own mirror alone.
+    met = _meets(level.position[shown], surfaces, through, mirror)
+    return shown[met], mirror[met]
+
+
+def _meets(eye: Points, surfaces: Surfaces, through: IntArray, mirror: Int64Array) -> BoolArray:
+    """Whether mirrors (m,) may be seen from points (m, 3) behind others, through these; seldom wrongly so."""
+    corners = surfaces.corners[mirror] - eye[:, None]
+    window = surfaces.corners[through] - eye[:, None]
+    level = np.einsum("mca,ma->mc", corners - window[:, :1], surfaces.normal[through])
+    met = (through != mirror) & (level > tolerances.SIDE * surfaces.size).any(axis=1)
+    for k in range(4):
+        edge = np.cross(window[:, k], window[:, (k + 1) % 4])
+        inside = np.einsum("mca,ma->mc", corners, edge)
+        degenerate = ~edge.any(axis=1)
+        met &= degenerate | (inside > 0.0).any(axis=1)
+    return np.asarray(met)
+
+
+def _likely(
+    level: VirtualLights,
+    surfaces: Surfaces,
+    shown: Int64Array,
+    mirror: Int64Array,
+    least: float,
+    most: int | None,
+) -> FloatArray:
+    """How likely (m,) images are chosen, by what they send, of which `least` W are sure; `most` in sum."""
+    sent = np.einsum("mc,mc,c->m", level.power[shown], surfaces.specular[mirror], LUMINANCE_WEIGHTS)
+    sent *= _solid_angle(surfaces.corners[mirror] - level.position[shown, None]) / np.pi
+    likely = np.minimum(sent / least, 1.0) if least > 0.0 else np.ones(len(shown))
+    if most is None or likely.sum() <= most:
+        return np.asarray(likely)
+    return _likelihoods(sent, most)
 
 
 def _facing(lights: VirtualLights, surfaces: Surfaces, mirrors: Int64Array) -> tuple[Int64Array, Int64Array]:

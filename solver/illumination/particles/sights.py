@@ -94,14 +94,14 @@ def look_around(
             for first in range(0, n, CHUNK):
                 part = slice(first, first + CHUNK)
                 hit[part] = rays.first_local(origins[part], directions[part])
-            found[light] = palette[: _number(hit, of_triangle, number, palette, texels[light])].copy()
+            found[light] = palette[: number_polygons(hit, of_triangle, number, palette, texels[light])].copy()
 
     run_chunks(trace, m, 8, 1)
     start = np.zeros(m + 1, dtype=np.int32)
     np.cumsum([len(part) for part in found], out=start[1:])
     polygon = np.concatenate([*found, np.empty(0, dtype=np.int32)])
     cone = np.empty((len(polygon), 16), dtype=np.float32)
-    _span(frames, start, polygon, polygons.corners, polygons.plane, cone)
+    span_cones(frames, start, polygon, polygons.corners, polygons.plane, cone)
     return Sights(texels.reshape(m, resolution, resolution), start, polygon, cone)
 
 
@@ -136,7 +136,9 @@ def _aim(
 
 
 @kernel
-def _number(hit: IntArray, of_triangle: IntArray, number: IntArray, palette: IntArray, texels: Texels) -> int:
+def number_polygons(
+    hit: IntArray, of_triangle: IntArray, number: IntArray, palette: IntArray, texels: Texels
+) -> int:
     """Number the polygons of the triangles `hit` (n,) as they come; how many there are, nothing included.
 
     `number` (q + 1,) is 0, and is left so. The last of `of_triangle` (t + 1,) stands for no triangle.
@@ -156,7 +158,7 @@ def _number(hit: IntArray, of_triangle: IntArray, number: IntArray, palette: Int
 
 
 @kernel
-def _span(
+def span_cones(
     frames: Float32Array,
     start: IntArray,
     polygon: IntArray,
