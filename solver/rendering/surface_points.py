@@ -6,6 +6,7 @@ Tiles of pixels follow one another, so that points near each other in the list a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -66,8 +67,9 @@ def surface_points(patch: IntArray, surfaces: Surfaces, eye: Vector, rays: Pixel
     return SurfacePoints((width, height), pixel, found, position)
 
 
+@lru_cache(maxsize=4)
 def _tiles(height: int, width: int) -> IntArray:
-    """Pixels (h w,), tile by tile."""
+    """Pixels (h w,), tile by tile; not to be written to."""
     row, column = np.divmod(np.arange(height * width, dtype=np.int64), width)
     across = -(-width // TILE)
     tile = (row // TILE) * across + column // TILE
