@@ -31,8 +31,14 @@ T = TypeVar("T", bound=np.generic)
 PATHS_PER_RAY: Final = 32
 """Paths of a block for each ray that a pixel sends to what is near."""
 
+PATHS_PER_LOBE: Final = 8
+"""Paths of a block for each ray that a pixel sends by a narrow lobe: lamps are found by these alone."""
+
 _HELPERS: Final = 4
-"""Batches of lights that light up what such rays meet."""
+"""Batches of lights that light up what rays to what is near meet."""
+
+_LOBE_HELPERS: Final = 1
+"""The same of rays by lobes, of which there are more."""
 
 _AT_ONCE: Final = 1 << 15
 """Rays to what is near between two yields."""
@@ -212,14 +218,13 @@ class InstantFrame:
                 self._blocks.shine(light, glossy.receivers, block, batch, bound, samples, glossy.gloss)
                 image.gloss[sample][:, glossy.broad] += light
             yield
-        near = self._nearby(block)
-        if np.isfinite(near.bound):
-            yield from self._compensate(image, block, near)
+        if self._settings.compensates and np.isfinite(bound):
+            yield from self._compensate(image, block, self._nearby(block, _HELPERS))
         if any(len(glossy.narrow) > 0 for glossy in self._glossy):
-            yield from self._send_lobes(image, block, near)
+            yield from self._send_lobes(image, block, self._nearby(block, _LOBE_HELPERS))
 
-    def _nearby(self, block: LightBlock) -> NearbyLight:
-        """What rays of a block come upon, and what its lights leave out."""
+    def _nearby(self, block: LightBlock, helpers: int) -> NearbyLight:
+        """What rays of a block come upon, by so many batches, and what its lights leave out."""
         world, bound = self._blocks.world, self._settings.bound
         helper = self._blocks.kept(block)
         batches = len(helper.sights)
@@ -227,9 +232,9 @@ class InstantFrame:
         def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
             # Other lights each time, so that in the mean all of them shine there.
             light = np.zeros((3, len(receivers)), dtype=np.float32)
-            for k in range(min(_HELPERS, batches)):
-                batch = (turn * _HELPERS + k) % batches
-                factor = max(1.0, batches / _HELPERS)
+            for k in range(min(helpers, batches)):
+                batch = (turn * helpers + k) % batches
+                factor = max(1.0, batches / helpers)
                 self._blocks.shine(light, receivers, helper, batch, bound, factor, gloss)
             return light
 
@@ -260,10 +265,10 @@ class InstantFrame:
         self._turn += rays
 
     def _send_lobes(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
-        """Find the light of narrow lobes by rays: as many as go to what is near, at least one for a point."""
+        """Find the light of narrow lobes, by one ray for every `PATHS_PER_LOBE` paths, over all samples."""
         if near.glossy is None:
             return
-        rays = max(1, round(block.paths / (PATHS_PER_RAY * len(self._points))))
+        rays = max(1, round(block.paths / (PATHS_PER_LOBE * len(self._points))))
         for sample, points in enumerate(self._points):
             glossy = self._glossy[sample]
             for ray in range(rays):

@@ -31,10 +31,10 @@ BROADEST: Final = 64.0
 _BOUNCES: Final = 16
 """After so many rays in a row light is left out; from the second on they end at random."""
 
-# The sequence of Roberts (2018) in three dimensions, of which two are used: rays to what is near have that in
-# two, and together both are as even as each.
-_FIRST: Final = 0.8191725133961645
-_SECOND: Final = 0.6710436067037893
+# Multiples of the roots of 2 and 3: even by themselves, and beside the sequence of rays to what is near, with
+# which they have no relation.
+_FIRST: Final = 0.4142135623730950
+_SECOND: Final = 0.7320508075688773
 _UNIT: Final = 2.0**-31
 _OWN: Final = 1 << 48
 """Streams of lobes are numbered from here on."""
