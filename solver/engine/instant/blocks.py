@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver.engine.world import World
+from solver.illumination.particles.compensation import emission_bounds
 from solver.illumination.particles.images import FoldedLights, ShiningImages, look_through
 from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.lighting import ShiningLights, add_light
@@ -20,7 +21,7 @@ from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.illumination.particles.sights import Sights, look_around
 from solver.illumination.particles.thinning import PATHS, thinned
 from solver.illumination.particles.walk import ParticleWalk
-from solver.types import Float32Array
+from solver.types import Float32Array, FloatArray
 
 FIRST: Final = 8
 """Paths of a first block."""
@@ -55,8 +56,12 @@ def first_path(number: int) -> int:
 class LightBlock:
     """The lights of one block, in an order that has nothing to do with where they are, and their images."""
 
-    def __init__(self, paths: int, lights: ShiningLights, images: ShiningImages) -> None:
+    def __init__(
+        self, paths: int, lights: ShiningLights, images: ShiningImages, emission_bound: FloatArray
+    ) -> None:
         self.paths = paths
+        self.emission_bound = emission_bound
+        """(p,) local: what patches emit is not bounded by less"""
         self.lights = lights
         self.images = images
         self.sights: list[Sights | None] = [None] * -(-len(lights) // BATCH)
@@ -96,10 +101,11 @@ class LightBlocks:
             lights = thinned(walked, surfaces, paths, self._seed)
             order = np.random.default_rng((self._seed, number)).permutation(len(lights)).astype(np.int32)
             lights = lights.take(order)
-            shining = ShiningLights.all_of(self.polygons, lights)
+            least = emission_bounds(surfaces, paths)
+            shining = ShiningLights.all_of(self.polygons, lights, least)
             images = mirror_images(lights, surfaces, len(lights), number)
             self._blocks[number] = LightBlock(
-                paths, shining, ShiningImages.of(self.polygons, shining, images)
+                paths, shining, ShiningImages.of(self.polygons, shining, images, least), least
             )
             self.light_count += len(shining)
         return self._blocks[number]

@@ -244,7 +244,8 @@ class InstantFrame:
         surfaces, polygons = world.surfaces, self._blocks.polygons
         glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
         bound = bound if self._settings.compensates else np.inf
-        return NearbyLight(surfaces, polygons, world.rays, bound, shine, self._known(), glossy)
+        bounds = (block.emission_bound, helper.emission_bound)
+        return NearbyLight(surfaces, polygons, world.rays, bound, shine, self._known(), glossy, bounds)
 
     def _compensate(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
         """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples."""

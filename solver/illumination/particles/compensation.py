@@ -24,7 +24,7 @@ from solver.illumination.particles.hemisphere import tangent_frames
 from solver.illumination.particles.mirror_ways import Ends, follow, is_glossy
 from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.kernels import kernel
-from solver.types import Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.rays import RayScene
 from solver.visibility.sampling import fraction_of, hash_index
 
@@ -33,6 +33,9 @@ Shine: TypeAlias = Callable[[Receivers, int], Float32Array]
 
 Known: TypeAlias = Callable[[Points, IntArray], FloatArray]
 """Irradiance (n, 3) W/m2 at points (n, 3) of patches (n,), by a solution."""
+
+_SPOT: Final = 0.1
+"""Part of a lamp's radiant exitance that one light may add to what is near."""
 
 _BOUNCES: Final = 16
 """After so many rays in a row light is left out; each is short, and few meet anything."""
@@ -57,6 +60,9 @@ class NearbyLight:
     """Where given, reflected light is this solution's: of scenes that are diffuse"""
     glossy: GlossyLight | None = None
     """What lobes reflect; None where nothing is glossy"""
+    emission_bounds: tuple[FloatArray, FloatArray] | None = None
+    """(p,) twice: what patches emit is not bounded by less, by the lights that shine at receivers, and by
+    those that shine where rays end"""
 
     def at(
         self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int = 0
@@ -86,21 +92,36 @@ class NearbyLight:
         here = np.einsum("na,na->n", directions[ends.row], s.normal[patch[ends.row]])
         there = np.abs(np.einsum("na,na->n", ends.along, s.normal[ends.patch]))
         kernel_value = here * there * (s.size / np.maximum(ends.distance, 1e-30)) ** 2
-        share = np.maximum(1.0 - self.bound / np.maximum(kernel_value, 1e-30), 0.0)
+        share = _left_out(kernel_value, self.bound)
         chosen = np.flatnonzero(share > 0.0)
-        ends, share = ends.take(chosen), share[chosen]
-        light = share[:, None] * ends.weight * self.leaving(ends, stream[ends.row], turn, bounce)
+        ends, share, kernel_value = ends.take(chosen), share[chosen], kernel_value[chosen]
+        emitted = share
+        if self.emission_bounds is not None:
+            least = self.emission_bounds[0 if bounce == 0 else 1]
+            emitted = _left_out(kernel_value, np.maximum(self.bound, least[ends.patch]))
+        light = ends.weight * self.leaving(ends, stream[ends.row], turn, bounce, share, emitted)
         for depth in range(int(ends.depth.max(initial=0)) + 1):
             rows = np.flatnonzero(ends.depth == depth)
             added[:, ends.row[rows]] += light[rows].T
         return added, directions
 
-    def leaving(self, ends: Ends, stream: Int64Array, turn: int, bounce: int) -> FloatArray:
-        """pi times the radiance (k, 3) of what rays come upon, but for the mirrors on their way."""
+    def leaving(
+        self,
+        ends: Ends,
+        stream: Int64Array,
+        turn: int,
+        bounce: int,
+        share: FloatArray | None = None,
+        emitted: FloatArray | None = None,
+    ) -> FloatArray:
+        """pi times the radiance (k, 3) of what rays come upon, but for the mirrors on their way.
+
+        Where given, it is the `share` (k,) of what is reflected there, and `emitted` (k,) of what is emitted.
+        """
         s, met = self.surfaces, ends.patch
         there = np.abs(np.einsum("na,na->n", ends.along, s.normal[met]))
         lobe = 0.5 * (s.emission_exponent[met] + 2.0) * there ** s.emission_exponent[met]
-        light = s.emission[met] * lobe[:, None]
+        light = np.zeros((len(met), 3))
         lit = np.flatnonzero(s.reflectance[met].any(axis=1)).astype(np.int32)
         light[lit] += s.reflectance[met[lit]] * self._irradiance(
             ends.position[lit], met[lit], stream[lit], turn, bounce
@@ -114,7 +135,10 @@ class NearbyLight:
                     self, ends.position[lobed], met[lobed], axis, stream[lobed], turn, bounce + 1
                 ).T
             )
-        return np.asarray(light)
+        if share is not None:
+            light *= share[:, None]
+        lobe *= 1.0 if emitted is None else emitted
+        return np.asarray(light + s.emission[met] * lobe[:, None])
 
     def _irradiance(
         self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int
@@ -126,6 +150,24 @@ class NearbyLight:
         lit = self.shine(Receivers.on(self.polygons, positions, patch), turn)
         lit += self.at(positions, patch, stream, turn, bounce + 1)
         return np.asarray(lit.T, dtype=np.float64)
+
+
+def emission_bounds(surfaces: Surfaces, paths: int) -> FloatArray:
+    """Bounds (p,) at which one of the lights of `paths` paths adds a small part of what its lamp emits.
+
+    A light on a lamp stands for a known part of it, and makes no spot unless that part is close by. So lights
+    on small lamps may be bounded later than others, which rays would find by chance.
+    """
+    exitance = surfaces.emission @ LUMINANCE_WEIGHTS
+    power = float(surfaces.area @ exitance)
+    if power <= 0.0:
+        return np.zeros(len(exitance))
+    return np.asarray(_SPOT * np.pi * paths * exitance * surfaces.size**2 / power)
+
+
+def _left_out(kernel_value: FloatArray, bound: FloatArray | float) -> FloatArray:
+    """Share (k,) that a bound takes away from cos cos' / r^2 (k,)."""
+    return np.maximum(1.0 - bound / np.maximum(kernel_value, 1e-30), 0.0)
 
 
 def _directions(normal: FloatArray, stream: Int64Array, turn: int, bounce: int) -> FloatArray:

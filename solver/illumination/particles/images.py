@@ -14,7 +14,7 @@ from solver.illumination.particles.receivers import Polygons, local
 from solver.illumination.particles.sights import Sights, join_sights, number_polygons, span_cones
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.types import BoolArray, Float32Array, Int64Array, IntArray
+from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray
 from solver.visibility.rays import CHUNK, RayScene
 
 
@@ -32,7 +32,13 @@ class ShiningImages:
     """(k,) patch that shows it"""
 
     @classmethod
-    def of(cls, polygons: Polygons, lights: ShiningLights, images: Images) -> ShiningImages:
+    def of(
+        cls,
+        polygons: Polygons,
+        lights: ShiningLights,
+        images: Images,
+        emission_bound: FloatArray | None = None,
+    ) -> ShiningImages:
         """The `images` of `lights`."""
         surfaces, mirror = polygons.surfaces, images.lights.mirror
         frames = np.empty((15, len(mirror)))
@@ -50,7 +56,7 @@ class ShiningImages:
                 along = ((vector - a if first == 0 else vector) * n).sum(axis=0)
                 frames[first : first + 3, ready] = vector - 2.0 * along * n
             is_left[ready] = False
-        shining = ShiningLights.all_of(polygons, images.lights)
+        shining = ShiningLights.all_of(polygons, images.lights, emission_bound)
         shining = replace(shining, frames=np.ascontiguousarray(frames, dtype=np.float32))
         return cls(shining, images.source, images.parent, mirror)
 
@@ -111,6 +117,7 @@ def look_through(
         np.concatenate([lights.frames, frames], axis=1),
         np.concatenate([lights.power, images.lights.power]),
         np.concatenate([lights.lobe, images.lights.lobe]),
+        np.concatenate([lights.least_bound, images.lights.least_bound]),
     )
     return FoldedLights(together, join_sights([sights, seen]), folds)
 

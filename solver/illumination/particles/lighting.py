@@ -10,7 +10,7 @@ points there are, texels of lightmaps and ends of rays too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -47,6 +47,8 @@ class ShiningLights:
     """(m, 3) local: W over pi and the squared size of the scene, W/m2"""
     lobe: Float32Array
     """(m,) k: intensity goes by the cosine to the normal, and by cos^(k - 1) to the axis; 1 is Lambert's"""
+    least_bound: Float32Array
+    """(m,) local: a lower bound is not heeded"""
 
     @classmethod
     def of(
@@ -67,18 +69,28 @@ class ShiningLights:
             np.ascontiguousarray(frames, dtype=np.float32),
             (power * scale[:, None]).astype(np.float32),
             lobe.astype(np.float32),
+            np.zeros(len(lobe), dtype=np.float32),
         )
 
     @classmethod
-    def all_of(cls, polygons: Polygons, lights: VirtualLights) -> ShiningLights:
-        """`lights`, glossy ones by their gloss; images by where they are, not by what they shine through."""
+    def all_of(
+        cls, polygons: Polygons, lights: VirtualLights, emission_bound: FloatArray | None = None
+    ) -> ShiningLights:
+        """`lights`, glossy ones by their gloss; images by where they are, not by what they shine through.
+
+        What patches emit is not bounded by less than their `emission_bound` (p,), where given.
+        """
         along = np.einsum("ma,ma->m", lights.incident, lights.normal)
         mirrored = lights.incident - 2.0 * along[:, None] * lights.normal
         glossy = lights.gloss >= 0.0
         # A lobe of n = 0 ends at a right angle to its axis, which Lambert's does not.
         lobe = np.where(glossy, 1.0 + np.maximum(lights.gloss, _LEAST_GLOSS), lights.lobe)
         axis = np.where(glossy[:, None], mirrored, lights.normal)
-        return cls.of(polygons, lights.position, lights.normal, lights.power, lobe, axis)
+        made = cls.of(polygons, lights.position, lights.normal, lights.power, lobe, axis)
+        if emission_bound is None:
+            return made
+        least = np.where(lights.generation == 0, emission_bound[lights.patch], 0.0)
+        return replace(made, least_bound=least.astype(np.float32))
 
     def __len__(self) -> int:
         return len(self.lobe)
@@ -89,6 +101,7 @@ class ShiningLights:
             np.ascontiguousarray(self.frames[:, rows]),
             np.float32(factor) * self.power[rows],
             self.lobe[rows],
+            self.least_bound[rows],
         )
 
     def part(self, first: int, last: int, factor: float = 1.0) -> ShiningLights:
@@ -97,6 +110,7 @@ class ShiningLights:
             np.ascontiguousarray(self.frames[:, first:last]),
             np.float32(factor) * self.power[first:last],
             self.lobe[first:last],
+            self.least_bound[first:last],
         )
 
 
@@ -118,8 +132,8 @@ def add_light(
     run_chunks(
         lambda start, stop: _light(
             start, stop, receivers.frame, receivers.polygon, lights.frames, lights.power, lights.lobe,
-            sights.texels, sights.start, sights.polygon, sights.cone, np.float32(bound), irradiance,
-            folds, gloss,
+            lights.least_bound, sights.texels, sights.start, sights.polygon, sights.cone, np.float32(bound),
+            irradiance, folds, gloss,
         ),
         len(receivers),
         _CHUNK,
@@ -135,6 +149,7 @@ def _light(
     lights: Float32Array,
     power: Float32Array,
     lobe: Float32Array,
+    least_bound: Float32Array,
     texels: Texels,
     sight_start: IntArray,
     seen: IntArray,
@@ -175,7 +190,7 @@ def _light(
                 continue
             if passes_by(low, high, lights, k, folds):
                 continue
-            _receive(x, y, z, nx, ny, nz, lights, k, bound, size, gain, texel)
+            _receive(x, y, z, nx, ny, nz, lights, k, max(bound, least_bound[k]), size, gain, texel)
             if lobe[k] != np.float32(1.0):
                 shape(x, y, z, lights, k, lobe[k], gain)
             if folds is not None:
