@@ -18,6 +18,8 @@ from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
 from solver.engine.instant.frames import InstantFrames
+from solver.engine.lightmaps.bake import Bake, LightmapRequest
+from solver.engine.lightmaps.begin import begin_bake
 from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.paths import PathFrames
 from solver.engine.picking import PickResult, pick_point
@@ -214,6 +216,13 @@ class Engine:
     def overlay(self, request: OverlayRequest) -> Work:
         """Show an overlay that is ready, in slices of a few milliseconds. Raises as `Overlay.show`."""
         return request.overlay.show(self._subject(request))
+
+    def bake(self, request: LightmapRequest) -> Bake | None:
+        """A lightmap of the scene as it stands, to be stepped; None while what it needs is worked on.
+
+        An edit leaves it as it is, of the revision before. Raises NotReadyError where it never can be made.
+        """
+        return begin_bake(request, self._revision, self._solution, self._fine_light(), self._settings)
 
     def _subject(self, request: OverlayRequest) -> Subject:
         return Subject(

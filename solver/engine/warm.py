@@ -18,6 +18,8 @@ from solver.document.edits import MoveEdit, RemoveEdit, SetMaterialEdit
 from solver.document.models import MaterialDocument, TransformDocument
 from solver.engine.drawing import Drawing, encode
 from solver.engine.engine import Engine
+from solver.engine.lightmaps.bake import LightmapRequest
+from solver.engine.lightmaps.files import LightmapFormat, encode_lightmap
 from solver.engine.overlays.backprojection import BackprojectionOverlay
 from solver.engine.overlays.base import OverlayRequest
 from solver.engine.overlays.places import Pixel
@@ -84,6 +86,7 @@ def warm_steps(drawing: Drawing) -> tuple[WarmStep, ...]:
         WarmStep("mesh", _mesh),
         WarmStep("draw", lambda: _draw(drawing)),
         WarmStep("follow links", _follow_links),
+        WarmStep("bake", _bake),
         WarmStep("encode", _encode),
         WarmStep("trace paths", _trace),
     )
@@ -200,6 +203,16 @@ def _follow_links() -> None:
     point = PointIrradiance.of(solver.state, solver.hierarchy, few=0)
     leaves = solver.state.tree.leaves
     point.at(solver.state.tree.centroid[leaves], leaves)
+
+
+def _bake() -> None:
+    """A lightmap, which needs no OpenGL."""
+    engine = Engine(_room(_RED, _WARM_LIGHT, range(5)), replace(_SETTINGS, max_paths=16))
+    bake = engine.bake(LightmapRequest(density=4.0))
+    while bake is not None and bake.step(_SLICE):
+        pass
+    if bake is not None:
+        encode_lightmap(bake.lightmap(), LightmapFormat.PNG, 1.0)
 
 
 def _drawable(drawing: Drawing) -> Iterator[FrameRequest]:
