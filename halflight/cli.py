@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from halflight import info, render, serve, warm
+from halflight import bake, info, render, serve, warm
 from halflight.console import project_version
 
 app = typer.Typer(
@@ -24,6 +24,7 @@ app = typer.Typer(
 app.command("serve")(serve.serve)
 app.command("warm")(warm.warm)
 app.command("render")(render.render)
+app.command("bake")(bake.bake)
 app.command("info")(info.info)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Final, TypeAlias, TypeVar
 
 from service.problems import NOT_ACCEPTABLE, ProblemError
+from solver.engine.lightmaps.files import LightmapFormat
 from solver.engine.overlays.files import OverlayFormat
 from solver.rendering.encoding import LinearFormat, PictureFormat
 
@@ -30,6 +31,13 @@ OVERLAY_TYPES: Final[dict[OverlayFormat, str]] = {
 }
 """The same for overlays"""
 
+LIGHTMAP_TYPES: Final[dict[LightmapFormat, str]] = {
+    LightmapFormat.GLB: "model/gltf-binary",
+    LightmapFormat.EXR: "image/x-exr",
+    LightmapFormat.PNG: "image/png",
+}
+"""The same for lightmaps"""
+
 _QUALITY: Final = re.compile(r"q=(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
 _TAG: Final = re.compile(r'(?:W/)?"([^"]*)"')
 
@@ -42,6 +50,11 @@ def choose_format(accept: str) -> FrameFormat:
 def choose_overlay_format(accept: str) -> OverlayFormat:
     """The format of overlays that an Accept header likes best. Raises ProblemError if it likes none."""
     return _choose(accept, OVERLAY_TYPES, "an overlay")
+
+
+def choose_lightmap_format(accept: str) -> LightmapFormat:
+    """The format of lightmaps that an Accept header likes best. Raises ProblemError if it likes none."""
+    return _choose(accept, LIGHTMAP_TYPES, "a lightmap")
 
 
 def _choose(accept: str, types: Mapping[T, str], what: str) -> T:

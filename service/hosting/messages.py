@@ -14,6 +14,8 @@ from solver.document.edits import Edit
 from solver.document.fields import Location
 from solver.document.limits import SceneLimits
 from solver.document.settings import SettingsDocument
+from solver.engine.lightmaps.bake import LightmapRequest
+from solver.engine.lightmaps.files import LightmapFormat
 from solver.engine.overlays.base import OverlayRequest
 from solver.engine.overlays.files import OverlayFormat
 from solver.engine.picking import PickResult
@@ -139,6 +141,37 @@ class GetOverlay(Request[OverlayAnswer]):
 
     overlay: OverlayRequest
     format: OverlayFormat
+    timeout: float
+    """Seconds"""
+
+
+@dataclass(frozen=True)
+class LightmapAnswer:
+    """An encoded lightmap, and what is to be told of it."""
+
+    content: bytes
+    revision: int
+    width: int
+    height: int
+    density: float
+    """Texels per metre"""
+    white: float
+    """W/m2 of irradiance that pictures show white"""
+    method: str
+    error_estimate: float
+    converged: bool
+
+
+@dataclass(frozen=True)
+class GetLightmap(Request[LightmapAnswer]):
+    """A lightmap, once it is good enough or time is up; refused where there is nothing of it by then."""
+
+    lightmap: LightmapRequest
+    format: LightmapFormat
+    white: float | None
+    """W/m2; None: as suits"""
+    complete: bool
+    """Wait until all is done that is to be done"""
     timeout: float
     """Seconds"""
 

@@ -6,9 +6,18 @@ import time
 from typing import Protocol
 
 from service.hosting.answers import answer_frame
-from service.hosting.messages import FrameAnswer, GetFrame, GetOverlay, OverlayAnswer
+from service.hosting.messages import (
+    FrameAnswer,
+    GetFrame,
+    GetLightmap,
+    GetOverlay,
+    LightmapAnswer,
+    OverlayAnswer,
+)
 from solver.engine.engine import Engine
-from solver.engine.overlays.base import Work, still_missing
+from solver.engine.lightmaps.bake import Bake
+from solver.engine.lightmaps.files import encode_lightmap, white_of
+from solver.engine.overlays.base import Needs, NotReadyError, Work, still_missing
 from solver.engine.overlays.files import encode_overlay
 
 
@@ -85,3 +94,54 @@ class WaitingOverlay:
         if not engine.is_overlay_ready(asked, complete=False):
             raise still_missing(asked.overlay.needs)
         return True
+
+
+class WaitingLightmap:
+    """A lightmap that is baked for one client."""
+
+    def __init__(self, request: GetLightmap, budget: float) -> None:
+        """`budget`: seconds of work of one poll."""
+        self._request = request
+        self._budget = budget
+        self._bake: Bake | None = None
+        self.deadline = time.monotonic() + request.timeout
+
+    @property
+    def is_working(self) -> bool:
+        """Once it has begun."""
+        return self._bake is not None
+
+    def poll(self, engine: Engine) -> LightmapAnswer | None:
+        """The lightmap, as good as asked or as it is when time is up. Raises NotReadyError, SceneError.
+
+        Once begun it is baked on for its own revision, where an edit comes between.
+        """
+        is_late = time.monotonic() >= self.deadline
+        if self._bake is None:
+            self._bake = engine.bake(self._request.lightmap)
+            if self._bake is None and is_late:
+                raise still_missing(Needs.POINT)
+        if self._bake is None:
+            return None
+        bake = self._bake
+        working = bake.step(self._budget)
+        if bake.is_drawable and (is_late or not working or not self._request.complete):
+            return self._answer(bake)
+        if is_late:
+            raise NotReadyError("no texel has all of its light yet: wait longer, or ask for fewer texels")
+        return None
+
+    def _answer(self, bake: Bake) -> LightmapAnswer:
+        lightmap = bake.lightmap()
+        white = white_of(lightmap) if self._request.white is None else self._request.white
+        return LightmapAnswer(
+            content=encode_lightmap(lightmap, self._request.format, white),
+            revision=lightmap.revision,
+            width=lightmap.atlas.width,
+            height=lightmap.atlas.height,
+            density=lightmap.atlas.density,
+            white=white,
+            method=lightmap.method,
+            error_estimate=lightmap.error_estimate,
+            converged=lightmap.converged,
+        )

@@ -23,13 +23,14 @@ from service.hosting.messages import (
     AnyRequest,
     Call,
     GetFrame,
+    GetLightmap,
     GetOverlay,
     Open,
     Ready,
     StatusChanged,
     ToWorker,
 )
-from service.hosting.waiting import Waiting, WaitingFrame, WaitingOverlay
+from service.hosting.waiting import Waiting, WaitingFrame, WaitingLightmap, WaitingOverlay
 from service.hosting.wire import WorkerEnd
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
@@ -97,6 +98,8 @@ class Host:
                 self._waiting[number] = WaitingFrame(request)
             case Call(number, GetOverlay() as request):
                 self._waiting[number] = WaitingOverlay(request, SLICE)
+            case Call(number, GetLightmap() as request):
+                self._waiting[number] = WaitingLightmap(request, SLICE)
             case Call(number, request):
                 value = self._answer(request)
                 self._report()

@@ -7,7 +7,7 @@ import pytest
 from service.config import ServiceSettings
 from tests.halflight.commands import WITHOUT_OPENGL, invoke, run
 
-COMMANDS = ["serve", "warm", "render", "info"]
+COMMANDS = ["serve", "warm", "render", "bake", "info"]
 
 
 def test_help_names_every_command() -> None:

@@ -30,6 +30,7 @@ OPERATIONS: Final = [
     ("GET", "/v1/sessions/{id}/frame"),
     ("POST", "/v1/sessions/{id}/probe"),
     ("GET", "/v1/sessions/{id}/pick"),
+    ("GET", "/v1/sessions/{id}/lightmap"),
     *(
         ("GET", f"/v1/sessions/{{id}}/overlays/{name}")
         for name in (
