@@ -117,7 +117,7 @@ class LightsBake(Bake):
         self, blocks: LightBlocks, block: LightBlock, texels: Texels, light: list[Float32Array]
     ) -> Iterator[None]:
         """Add what bounded lights leave out: a ray for every `PATHS_PER_RAY` paths, over the texels."""
-        near = self._nearby(blocks, blocks.kept(block))
+        near = self._nearby(blocks, block, blocks.kept(block))
         rays, every = max(1, block.paths // PATHS_PER_RAY), max(1, PATHS_PER_RAY // block.paths)
         for ray in range(rays):
             turn = self._turn + ray
@@ -129,8 +129,8 @@ class LightsBake(Bake):
                 yield
         self._turn += rays
 
-    def _nearby(self, blocks: LightBlocks, helper: LightBlock) -> NearbyLight:
-        """What short rays come upon, lit by some batches of `helper`, others each time."""
+    def _nearby(self, blocks: LightBlocks, block: LightBlock, helper: LightBlock) -> NearbyLight:
+        """What short rays come upon, lit by batches of `helper`, others each time: what `block` misses."""
         world, polygons = self._world, blocks.polygons
         surfaces, batches = world.surfaces, len(helper.sights)
 
@@ -146,7 +146,8 @@ class LightsBake(Bake):
             return polish(receivers, None, turn)
 
         glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
-        return NearbyLight(surfaces, polygons, world.rays, self._bound, shine, self._known, glossy)
+        bounds = (block.emission_bound, helper.emission_bound)
+        return NearbyLight(surfaces, polygons, world.rays, self._bound, shine, self._known, glossy, bounds)
 
     def _add(self, light: list[Float32Array], paths: int) -> None:
         """Take a block into the mean, and learn from how it differs from those before."""
