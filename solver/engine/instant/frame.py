@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
 from solver.engine.instant.image import Image, joined
 from solver.engine.instant.points import GlossyPoints, LitPoints, matched
+from solver.engine.instant.resolve import add_radiance, add_to_pixels
 from solver.geometry.scene import Camera
 from solver.illumination.particles.compensation import Known, NearbyLight
 from solver.illumination.particles.glossy import GlossyLight
@@ -88,6 +89,7 @@ class InstantFrame:
         self._estimate = 1.0
         self._turn = 0
         self._lobe_turn = 0
+        self._emitted: list[FloatArray] | None = None
         if before is not None:
             self._take_over(before)
         self._work = self._run()
@@ -129,29 +131,38 @@ class InstantFrame:
         It is that of the surfaces that pixels show themselves: of a mirror, what falls on the mirror.
         """
         seen = zip(self._points, self._mean(self._images()), strict=True)
-        return self._gathered(
-            [np.where(p.depth[:, None] == 0, light.T.astype(np.float64), 0.0) for p, light in seen]
-        )
+        picture = self._black()
+        for points, light in seen:
+            shown = slice(0, points.shown)
+            add_to_pixels(points.pixel[shown], light.T[shown].astype(np.float64), picture)
+        return self._finished(picture)
 
     def radiance(self) -> FloatArray:
         """(h, w, 3) W/(m2 sr)."""
         world = self._blocks.world
         surfaces, images = world.surfaces, self._images()
-        values = []
-        for points, glossy, light, gloss in zip(
-            self._points, self._glossy, self._mean(images), self._mean_gloss(images), strict=True
+        if self._emitted is None:
+            self._emitted = [points.emitted(world) for points in self._points]
+        reflected, picture = surfaces.reflectance / np.pi, self._black()
+        for points, glossy, emitted, light, gloss in zip(
+            self._points,
+            self._glossy,
+            self._emitted,
+            self._mean(images),
+            self._mean_gloss(images),
+            strict=True,
         ):
-            value = points.emitted(world) + surfaces.reflectance[points.patch] * light.T / np.pi
-            value[glossy.row] += surfaces.specular[points.patch[glossy.row]] * gloss.T / np.pi
-            values.append(points.weight * value)
-        return self._gathered(values)
+            add_radiance(points.pixel, points.patch, points.weight, emitted, reflected, light, picture)
+            row = glossy.row
+            lobed = points.weight[row] * surfaces.specular[points.patch[row]] * gloss.T / np.pi
+            add_to_pixels(points.pixel[row], lobed, picture)
+        return self._finished(picture)
 
-    def _gathered(self, values: list[FloatArray]) -> FloatArray:
-        width, height = self.camera.width, self.camera.height
-        pixel = np.concatenate([points.pixel for points in self._points])
-        value = np.concatenate(values)
-        image = [np.bincount(pixel, value[:, c], width * height) for c in range(3)]
-        return np.stack(image, axis=1).reshape(height, width, 3) / len(self._points)
+    def _black(self) -> FloatArray:
+        return np.zeros((self.camera.width * self.camera.height, 3))
+
+    def _finished(self, picture: FloatArray) -> FloatArray:
+        return picture.reshape(self.camera.height, self.camera.width, 3) / len(self._points)
 
     def _images(self) -> list[Image]:
         return [image for image in (*self._ring, self._rest) if image is not None]
