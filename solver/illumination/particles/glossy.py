@@ -25,8 +25,11 @@ from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArr
 from solver.visibility.rays import RayScene
 from solver.visibility.sampling import fraction_of, hash_index
 
-BROADEST: Final = 64.0
-"""Lobes of an exponent above this are narrow: in a room with a glossy floor both ways err alike there."""
+BROADEST: Final = 16.0
+"""Lobes that pixels show are narrow above this exponent: there both ways err alike on a glossy floor."""
+
+BROADEST_BEYOND: Final = 300.0
+"""The same of lobes that rays come upon, each seen once: a ray that finds a lamp makes a spot."""
 
 _BOUNCES: Final = 16
 """After so many rays in a row light is left out; from the second on they end at random."""
@@ -78,7 +81,7 @@ class GlossyLight:
         light = np.zeros((3, len(patch)))
         if len(patch) == 0 or bounce >= _BOUNCES:
             return light
-        broad = is_broad(self.surfaces, patch)
+        broad = self.surfaces.exponent[patch] <= BROADEST_BEYOND
         rows = np.flatnonzero(broad)
         if len(rows) > 0:
             gloss = gloss_of(self.surfaces, patch[rows], axis[rows])
@@ -125,7 +128,7 @@ class GlossyLight:
 
 
 def is_broad(surfaces: Surfaces, patch: IntArray) -> BoolArray:
-    """Whether the lobes of glossy patches (n,) are lit by virtual lights."""
+    """Whether the lobes of glossy patches (n,), shown by pixels, are lit by virtual lights."""
     return np.asarray(surfaces.exponent[patch] <= BROADEST)
 
 
