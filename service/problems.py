@@ -53,6 +53,7 @@ class Kind:
 INVALID: Final = Kind("invalid", 422, "The input is not acceptable")
 NO_SUCH_SESSION: Final = Kind("no-such-session", 404, "There is no such session")
 CONFLICT: Final = Kind("revision-conflict", 409, "The scene is at another revision")
+NOTHING: Final = Kind("nothing-to-reverse", 409, "There is no edit batch to go to")
 NOT_READY: Final = Kind("not-ready", 409, "What was asked for is not there yet")
 LIMIT: Final = Kind("limit-exceeded", 413, "More than the limit was asked for")
 TOO_MANY_SESSIONS: Final = Kind("too-many-sessions", 429, "There are too many sessions")
@@ -67,6 +68,7 @@ INTERNAL: Final = Kind("internal", 500, "Something went wrong inside")
 _OF_REFUSAL: Final = {
     RefusalKind.INVALID: INVALID,
     RefusalKind.CONFLICT: CONFLICT,
+    RefusalKind.NOTHING: NOTHING,
     RefusalKind.LIMIT: LIMIT,
     RefusalKind.NOT_AVAILABLE: NOT_AVAILABLE,
     RefusalKind.NO_RENDERING: NO_RENDERING,

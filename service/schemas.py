@@ -159,6 +159,13 @@ class EditsAnswer(BaseModel):
     changes: list[LogEntry]
 
 
+class LogAnswer(BaseModel):
+    """The change log, oldest entries first."""
+
+    revision: int
+    entries: list[LogEntry]
+
+
 class ProbePoint(Closed):
     """A point and the direction that it faces."""
 

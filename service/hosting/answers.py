@@ -14,16 +14,20 @@ from service.hosting.messages import (
     EditsAnswer,
     FrameAnswer,
     GetFrame,
+    GetLog,
     GetPick,
     GetScene,
     GetStatus,
     Probe,
+    Redo,
     Refusal,
     RefusalKind,
     SceneAnswer,
+    Undo,
 )
 from solver.engine.drawing import encode
 from solver.engine.engine import Engine
+from solver.engine.history import NothingToReverseError
 from solver.engine.overlays.base import NotReadyError
 from solver.engine.requests import NotAvailableError
 from solver.engine.views import Outlook
@@ -53,6 +57,14 @@ def answer(engine: Engine, request: AnyRequest) -> object:
         case ApplyEdits(edits, if_revision):
             changes = engine.apply(edits, if_revision)
             return EditsAnswer(engine.revision, changes)
+        case Undo():
+            changes = engine.undo()
+            return EditsAnswer(engine.revision, changes)
+        case Redo():
+            changes = engine.redo()
+            return EditsAnswer(engine.revision, changes)
+        case GetLog():
+            return EditsAnswer(engine.revision, engine.log())
         case GetPick(camera, x, y):
             return engine.pick(camera, x, y)
         case Probe(positions, normals):
@@ -86,6 +98,8 @@ def refusal_of(error: SolverError | MemoryError) -> Refusal:
             return Refusal(RefusalKind.INVALID, error.message, error.location)
         case EncodingError():
             return Refusal(RefusalKind.INVALID, str(error), ("format",))
+        case NothingToReverseError():
+            return Refusal(RefusalKind.NOTHING, str(error))
         case RevisionConflictError():
             return Refusal(RefusalKind.CONFLICT, str(error))
         case LimitExceededError():

@@ -88,6 +88,21 @@ class ApplyEdits(Request[EditsAnswer]):
 
 
 @dataclass(frozen=True)
+class Undo(Request[EditsAnswer]):
+    """Take back the newest batch."""
+
+
+@dataclass(frozen=True)
+class Redo(Request[EditsAnswer]):
+    """Bring back the batch that was taken back last."""
+
+
+@dataclass(frozen=True)
+class GetLog(Request[EditsAnswer]):
+    """The change log: all entries, and the revision."""
+
+
+@dataclass(frozen=True)
 class FrameAnswer:
     """An encoded frame; without content where the client has it already."""
 
@@ -181,6 +196,7 @@ class RefusalKind(StrEnum):
 
     INVALID = "invalid"
     CONFLICT = "conflict"
+    NOTHING = "nothing"
     LIMIT = "limit"
     NOT_AVAILABLE = "not_available"
     NO_RENDERING = "no_rendering"

@@ -15,9 +15,6 @@ sockets = APIRouter(prefix="/v1")
 _of_session = [Depends(session_of)]
 
 
-@router.post("/sessions/{id}/undo", dependencies=_of_session)
-@router.post("/sessions/{id}/redo", dependencies=_of_session)
-@router.get("/sessions/{id}/log", dependencies=_of_session)
 @router.get("/sessions/{id}/stream", dependencies=_of_session)
 async def not_yet() -> None:
     """Say that this is still to come."""

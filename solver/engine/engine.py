@@ -14,9 +14,11 @@ import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
+from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
+from solver.engine.history import History, Step, step_of
 from solver.engine.instant.frames import InstantFrames
 from solver.engine.lightmaps.bake import Bake, LightmapRequest
 from solver.engine.lightmaps.begin import begin_bake
@@ -76,7 +78,8 @@ class Engine:
         self._gathers: GatherFrames | None = None
         self._instant: InstantFrames | None = None
         self._revision = 1
-        self._entries = 0
+        self._history = History()
+        self._log = ChangeLog()
         self._turn = 0
         self._settle(World.of(scene), None)
 
@@ -103,14 +106,24 @@ class Engine:
         """
         if if_revision is not None and if_revision != self._revision:
             raise RevisionConflictError(if_revision, self._revision)
-        scene = apply_edits(self.scene, edits)
+        before, scene = self.scene, apply_edits(self.scene, edits)
         self._limits.check(scene)
-        world = World.of(scene, self._world)
-        changes = self._changes(edits, world)
-        self._settle(world, self._solution)
-        self._revision += 1
-        self._entries += len(changes)
+        step = step_of(edits, scene)
+        changes = self._take(step)
+        self._history.record(before, step)
         return changes
+
+    def undo(self) -> tuple[Change, ...]:
+        """Take back the newest edit batch, as an edit of its own. Raises NothingToReverseError."""
+        return self._take(self._history.undo())
+
+    def redo(self) -> tuple[Change, ...]:
+        """Bring back the batch that was taken back last. Raises NothingToReverseError."""
+        return self._take(self._history.redo())
+
+    def log(self) -> tuple[Change, ...]:
+        """The change log as it stands, oldest entries first."""
+        return self._log.entries(self._progress())
 
     def configure(self, settings: LightSettings) -> None:
         """Solve on by other settings."""
@@ -314,19 +327,36 @@ class Engine:
             improving=view.improving,
         )
 
-    def _changes(self, edits: Sequence[Edit], after: World) -> tuple[Change, ...]:
+    def _take(self, step: Step) -> tuple[Change, ...]:
+        """Go on in the scene that `step` leads to."""
+        world = World.of(step.scene, self._world)
+        changes = self._changes(step, world)
+        self._log.add(changes, self._progress())
+        self._settle(world, self._solution)
+        self._revision += 1
+        return changes
+
+    def _progress(self) -> Progress:
+        solver, statistics = self._solution.solver, self._solution.solver.statistics()
+        return Progress(
+            share_done=solver.progress,
+            shots=statistics.gathers * statistics.links,
+            is_settled=self._solution.state is SessionState.CONVERGED,
+        )
+
+    def _changes(self, step: Step, after: World) -> tuple[Change, ...]:
         power, emitted = self._solution.power_by_object(), after.emission_by_object()
         return tuple(
             Change(
-                entry=self._entries + number,
+                entry=self._log.count + number,
                 revision=self._revision + 1,
-                op=edit.op,
-                id=edit.object_id,
+                op=deed.op,
+                id=deed.object_id,
                 state=ChangeState.PENDING,
-                energy_to_redistribute=power.get(edit.object_id, emitted.get(edit.object_id, 0.0)),
+                energy_to_redistribute=power.get(deed.object_id, emitted.get(deed.object_id, 0.0)),
                 shots=0,
             )
-            for number, edit in enumerate(edits, 1)
+            for number, deed in enumerate(step.deeds, 1)
         )
 
 
