@@ -118,7 +118,8 @@ def _beyond_diffuse(surfaces: Surfaces, is_sampled: bool) -> tuple[str, ...]:
         who = "The renderers flat, gouraud, interpolant and gather, probes and error estimates"
         does, takes = "leave specular reflection out", "take directional emission as diffuse"
     parts = [does] * surfaces.has_specular + [takes] * surfaces.has_directional_emission
-    return (f"{who} {' and '.join(parts)}; the renderer path has all of it.",) if parts else ()
+    shown = "the renderer path has all of it, and so has vpl, but for light by many mirrors in a row"
+    return (f"{who} {' and '.join(parts)}; {shown}.",) if parts else ()
 
 
 def _sampled_warning(patches: int) -> str:
