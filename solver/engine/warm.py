@@ -8,6 +8,7 @@ and coloured, quadrilaterals and triangles, full, partial and no visibility, emi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -48,6 +49,9 @@ _SLICE: Final = 1.0
 _SETTINGS: Final = LightSettings(error_tolerance=0.03)
 """Reached by some rounds of refinement, so that links are split, resampled and inherited."""
 
+_PATHS: Final = 64
+"""Of frames by virtual lights."""
+
 _GREY: Final = (0.5, 0.5, 0.5)
 _RED: Final = (0.6, 0.3, 0.2)
 _DARK: Final = (0.0, 0.0, 0.0)
@@ -85,6 +89,7 @@ def warm_steps(drawing: Drawing) -> tuple[WarmStep, ...]:
         WarmStep("edit and probe", lambda: _edit(drawing)),
         WarmStep("mesh", _mesh),
         WarmStep("draw", lambda: _draw(drawing)),
+        WarmStep("draw mirrors and gloss", lambda: _reflect(drawing)),
         WarmStep("follow links", _follow_links),
         WarmStep("bake", _bake),
         WarmStep("encode", _encode),
@@ -175,13 +180,31 @@ def _draw(drawing: Drawing) -> None:
     if drawing.problem is not None:
         return
     for scene in (_room(_RED, _WARM_LIGHT, range(5)), _room(_GREY, _LIGHT, range(6))):
-        engine = Engine(scene, _SETTINGS, drawing=drawing)
+        engine = Engine(scene, replace(_SETTINGS, max_paths=_PATHS), drawing=drawing)
         _run(engine)
         for request in _drawable(drawing):
             engine.outlook(request)
             _run(engine)
             engine.frame(request)
         _pick_and_probe(engine)
+
+
+def _reflect(drawing: Drawing) -> None:
+    """A frame by virtual lights of a scene with a mirror, gloss broad and narrow, and a directional lamp."""
+    if drawing.problem is not None:
+        return
+    scene = _specular(_room(_RED, _WARM_LIGHT, range(5)), 4.0)
+    table = scene.object("table")
+    narrow = replace(table.material, specular=np.array([0.1, 0.2, 0.3]), exponent=1000.0)
+    scene = scene.with_replaced(replace(table, material=narrow))
+    walls = scene.object("walls")
+    mirror = replace(walls.material, specular=np.full(3, 0.3), exponent=math.inf)
+    for shown in (scene, scene.with_replaced(replace(walls, material=mirror))):
+        engine = Engine(shown, replace(_SETTINGS, max_paths=_PATHS), drawing=drawing)
+        request = FrameRequest(CameraChoice(), RendererName.VPL)
+        while engine.outlook(request).improving:
+            engine.step(_SLICE)
+        engine.frame(request)
 
 
 def _pick_and_probe(engine: Engine) -> None:
@@ -242,12 +265,15 @@ def _trace() -> None:
     """Paths through a diffuse scene, and through gloss and a directional lamp, which other code traces."""
     scene = _room(_RED, _WARM_LIGHT, range(5))
     _trace_scene(scene)
+    _trace_scene(_specular(scene, 20.0))
+
+
+def _specular(scene: Scene, exponent: float) -> Scene:
+    """`scene` with a glossy screen and a directional lamp."""
     screen, lamp = scene.object("screen"), scene.object("lamp")
-    gloss = replace(screen.material, specular=np.array([0.1, 0.2, 0.3]), exponent=20.0)
+    gloss = replace(screen.material, specular=np.array([0.1, 0.2, 0.3]), exponent=exponent)
     spot = replace(lamp.material, emission_exponent=4.0)
-    _trace_scene(
-        scene.with_replaced(replace(screen, material=gloss)).with_replaced(replace(lamp, material=spot))
-    )
+    return scene.with_replaced(replace(screen, material=gloss)).with_replaced(replace(lamp, material=spot))
 
 
 def _trace_scene(scene: Scene) -> None:
