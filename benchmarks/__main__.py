@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _SECTIONS: Final = (
     "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "walks",
-    "service",
+    "instant", "lights", "walkthrough", "service",
 )  # fmt: skip
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 
@@ -49,6 +49,8 @@ def bench(
         accuracy,
         fine,
         frames,
+        instant,
+        instant_costs,
         interpolant_frames,
         occlusion,
         patterns,
@@ -56,6 +58,7 @@ def bench(
         serving,
         solving,
         walks,
+        walkthrough,
     )
     from benchmarks.isolation import in_own_process
     from benchmarks.machine import Machine
@@ -67,7 +70,7 @@ def bench(
     chosen = _named(only, _SECTIONS, "--only") if only else _SECTIONS
     modules = (
         solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, walks,
-        serving,
+        instant, instant_costs, walkthrough, serving,
     )  # fmt: skip
     made = (module.section(options) for module in modules)
     plan = [section for section in made if section.name in chosen and section.jobs]
