@@ -194,6 +194,65 @@ def test_layers_of_interpolants(client: TestClient, settled: str, layer: str) ->
     assert np.isfinite(numbers).all()
 
 
+# --- virtual lights ---
+
+
+def test_frames_by_virtual_lights_come_without_a_solve(client: TestClient) -> None:
+    """A session that would solve for long has a picture at once, and its headers tell what it is worth."""
+    path = open_box(client, error_tolerance=1e-5)
+    query = {"renderer": "vpl", "timeout_ms": 10_000, "wait": "max_error=0.2"}
+    answer = client.get(f"{path}/frame", params=query)
+    assert answer.status_code == 200
+    assert answer.headers["x-renderer"] == "vpl"
+    assert answer.headers["x-revision"] == "1"
+    assert answer.headers["x-converged"] == "false"
+    assert 1e-5 < float(answer.headers["x-error-estimate"]) <= 0.2
+    assert client.get(path).json()["state"] == "solving"
+    late = client.get(f"{path}/frame", params={**query, "wait": "converged", "timeout_ms": 200})
+    assert late.status_code == 200, "a wait is bounded"
+    assert late.headers["x-converged"] == "false"
+    assert client.delete(path).status_code == 204
+
+
+def test_converged_frames_by_virtual_lights_have_a_tag_that_stays(client: TestClient, settled: str) -> None:
+    query = {"renderer": "vpl", "width": 40, "height": 30, "wait": "converged"}
+    first = client.get(f"{settled}/frame", params=query)
+    assert first.headers["x-converged"] == "true"
+    assert 0.0 < float(first.headers["x-error-estimate"]) <= 0.05
+    again = client.get(f"{settled}/frame", params=query, headers={"If-None-Match": first.headers["etag"]})
+    assert again.status_code == 304
+    assert again.content == b""
+    less = 0.5 * float(first.headers["x-error-estimate"])
+    better = client.get(f"{settled}/frame", params={**query, "wait": f"max_error={less}"})
+    assert better.headers["etag"] != first.headers["etag"]
+    assert float(better.headers["x-error-estimate"]) <= less
+
+
+def test_virtual_lights_and_a_solution_give_one_picture(client: TestClient, settled: str) -> None:
+    asked = {"wait": "converged", "samples": 4}
+    solved, lit = (frame(client, settled, **asked, **r) for r in ({}, {"renderer": "vpl"}))
+    assert lit.dtype == np.float32
+    assert lit.mean() == pytest.approx(solved.mean(), rel=0.05)
+    illuminance = frame(client, settled, renderer="vpl", layer="illuminance", **asked)[CORNER]
+    assert illuminance == pytest.approx([179.0 * float(lit[CORNER] @ [0.0, math.pi, 0.0]) / 0.4] * 3, rel=0.1)
+
+
+def test_an_edit_shows_at_once_by_virtual_lights(client: TestClient, session: str) -> None:
+    query = {"renderer": "vpl", "wait": "converged"}
+    before = client.get(f"{session}/frame", params=query)
+    edits = {"edits": [{"op": "remove", "id": "crate"}]}
+    assert client.post(f"{session}/edits", json=edits).json()["revision"] == 2
+    answer = client.get(f"{session}/frame", params={"renderer": "vpl"})
+    assert (answer.status_code, answer.headers["x-revision"]) == (200, "2")
+    assert answer.headers["etag"] != before.headers["etag"]
+    after = client.get(f"{session}/frame", params=query)
+    assert after.headers["x-converged"] == "true"
+
+
+def test_samples_of_virtual_lights_have_a_limit(client: TestClient, settled: str) -> None:
+    problem_of(client.get(f"{settled}/frame", params={"renderer": "vpl", "samples": 17}), 413)
+
+
 # --- waiting ---
 
 
