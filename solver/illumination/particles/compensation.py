@@ -24,7 +24,7 @@ from solver.illumination.particles.hemisphere import tangent_frames
 from solver.illumination.particles.mirror_ways import Ends, follow, is_glossy
 from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.kernels import kernel
-from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.types import LUMINANCE_WEIGHTS, BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.rays import RayScene
 from solver.visibility.sampling import fraction_of, hash_index
 
@@ -36,6 +36,10 @@ Known: TypeAlias = Callable[[Points, IntArray], FloatArray]
 
 _SPOT: Final = 0.1
 """Part of a lamp's radiant exitance that one light may add to what is near."""
+
+_GOES_ON: Final = 0.5
+"""Share of the ends of rays from which another is sent, from the second on: all of the first send one, or
+corners become noisy."""
 
 _BOUNCES: Final = 16
 """After so many rays in a row light is left out; each is short, and few meet anything."""
@@ -148,7 +152,15 @@ class NearbyLight:
         if self.known is not None:
             return self.known(positions, patch)
         lit = self.shine(Receivers.on(self.polygons, positions, patch), turn)
-        lit += self.at(positions, patch, stream, turn, bounce + 1)
+        if bounce == 0:
+            lit += self.at(positions, patch, stream, turn, 1)
+        else:
+            # What is left out there in turn is little, and fewer rays tell.
+            going = np.empty(len(patch), dtype=np.bool_)
+            _draw_some(stream, turn, bounce, going)
+            rows = np.flatnonzero(going)
+            again = self.at(positions[rows], patch[rows], stream[rows], turn, bounce + 1)
+            lit[:, rows] += again * np.float32(1.0 / _GOES_ON)
         return np.asarray(lit.T, dtype=np.float64)
 
 
@@ -176,6 +188,14 @@ def _directions(normal: FloatArray, stream: Int64Array, turn: int, bounce: int) 
     local = np.empty((len(normal), 3))
     _draw(stream, turn, bounce, local)
     return np.asarray(local[:, :1] * tangent + local[:, 1:2] * other + local[:, 2:] * normal)
+
+
+@kernel
+def _draw_some(stream: Int64Array, turn: int, bounce: int, chosen: BoolArray) -> None:
+    """Choose `_GOES_ON` of all (n,), others in each turn."""
+    for i in range(len(stream)):
+        h = hash_index((np.int64(stream[i]) * _BOUNCES + bounce) * 0x100003 + turn)
+        chosen[i] = (h & 0x7FFFFFFF) * _UNIT < _GOES_ON
 
 
 @kernel
