@@ -49,8 +49,8 @@ _SLICE: Final = 1.0
 _SETTINGS: Final = LightSettings(error_tolerance=0.03)
 """Reached by some rounds of refinement, so that links are split, resampled and inherited."""
 
-_PATHS: Final = 64
-"""Of frames by virtual lights."""
+_FEW_PATHS: Final = replace(_SETTINGS, max_paths=64, vpl_resolution=8)
+"""Frames by virtual lights that are soon done."""
 
 _GREY: Final = (0.5, 0.5, 0.5)
 _RED: Final = (0.6, 0.3, 0.2)
@@ -180,7 +180,7 @@ def _draw(drawing: Drawing) -> None:
     if drawing.problem is not None:
         return
     for scene in (_room(_RED, _WARM_LIGHT, range(5)), _room(_GREY, _LIGHT, range(6))):
-        engine = Engine(scene, replace(_SETTINGS, max_paths=_PATHS), drawing=drawing)
+        engine = Engine(scene, _FEW_PATHS, drawing=drawing)
         _run(engine)
         for request in _drawable(drawing):
             engine.outlook(request)
@@ -200,7 +200,7 @@ def _reflect(drawing: Drawing) -> None:
     walls = scene.object("walls")
     mirror = replace(walls.material, specular=np.full(3, 0.3), exponent=math.inf)
     for shown in (scene, scene.with_replaced(replace(walls, material=mirror))):
-        engine = Engine(shown, replace(_SETTINGS, max_paths=_PATHS), drawing=drawing)
+        engine = Engine(shown, _FEW_PATHS, drawing=drawing)
         request = FrameRequest(CameraChoice(), RendererName.VPL)
         while engine.outlook(request).improving:
             engine.step(_SLICE)
