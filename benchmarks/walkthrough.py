@@ -48,7 +48,7 @@ class WalkthroughFigures:
     points: float
     """Milliseconds until a new camera's points are found"""
     error: float
-    """Relative RMS of the last frame, against one of many paths"""
+    """Relative RMS of the last frame's irradiance, against one of many paths"""
 
 
 def measure_walkthrough(budget: float, count: int) -> WalkthroughFigures:
@@ -56,7 +56,7 @@ def measure_walkthrough(budget: float, count: int) -> WalkthroughFigures:
     scene = load_sample(SCENE)
     engine = Engine(scene, drawing=Drawing())
     camera = CameraChoice(width=WIDTH, height=HEIGHT).resolve(scene)
-    seconds, found, paths, last = [], [], [], np.empty(0)
+    seconds, found, paths = [], [], []
     for number in range(-2, count):
         request = _request(camera, number)
         start = time.perf_counter()
@@ -64,9 +64,10 @@ def measure_walkthrough(budget: float, count: int) -> WalkthroughFigures:
         found.append(time.perf_counter() - start)
         while not frame.is_drawable or time.perf_counter() - start < budget:
             frame.step()
-        last = frame.radiance() @ LUMINANCE_WEIGHTS
+        frame.radiance()
         seconds.append(time.perf_counter() - start)
         paths.append(frame.paths)
+    last = frame.irradiance() @ LUMINANCE_WEIGHTS
     while frame.paths < _MASTER:
         frame.step()
     return WalkthroughFigures(
@@ -76,7 +77,7 @@ def measure_walkthrough(budget: float, count: int) -> WalkthroughFigures:
         longest=max(seconds[2:]),
         paths=float(np.mean(paths[2:])),
         points=1e3 * float(np.mean(found[2:])),
-        error=_difference(last, frame.radiance() @ LUMINANCE_WEIGHTS),
+        error=_difference(last, frame.irradiance() @ LUMINANCE_WEIGHTS),
     )
 
 
@@ -118,5 +119,5 @@ def tabulate(found: list[WalkthroughFigures]) -> Table:
             for figures in found
         ),
         "The camera moves with every frame, and nothing of the picture before it is used. Error: of the last "
-        f"frame, against the same view by {_MASTER:,} paths.",
+        f"one's irradiance, against the same view by {_MASTER:,} paths.",
     )

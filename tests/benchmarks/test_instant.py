@@ -47,7 +47,7 @@ def test_walkthroughs_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     figures = walkthrough.measure_walkthrough(0.02, 3)
     assert figures.paths >= 8
     assert 0.0 < figures.rate < 50.0
-    assert 0.0 <= figures.error < 0.5
+    assert 0.0 <= figures.error < 1.0
     table = walkthrough.tabulate([figures])
     assert len(table.rows) == 1
     assert len(table.rows[0].cells) == len(table.columns)
@@ -56,9 +56,6 @@ def test_walkthroughs_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_sections_hold_what_there_are_references_for() -> None:
     whole, quick = Options(), Options(("office", "robot_cell"), quick=True)
     assert len(instant.section(whole).jobs) == len(instant.VIEWS)
-    assert [job.arguments for job in instant.section(quick).jobs] == [
-        ("office", "main", 512),
-        ("office", "birds_eye", 512),
-    ]
+    assert [job.arguments for job in instant.section(quick).jobs] == [("office", "birds_eye", 512)]
     assert len(instant_costs.section(quick).jobs) == 2
     assert len(walkthrough.section(Options(("cornell",))).jobs) == 0
