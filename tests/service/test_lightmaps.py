@@ -11,6 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
+from tests.service.conftest import open_box
 from tests.service.problem import fields_at_fault, problem_of
 
 
@@ -78,11 +79,15 @@ def test_time_that_is_up_ends_the_wait(client: TestClient, settled: str) -> None
     query: dict[str, str | float] = {"density": 200, "format": "png", "timeout_ms": 0}
     problem = problem_of(client.get(f"{settled}/lightmap", params=query), 409)
     assert problem["type"] == "urn:halflight:not-ready"
-    query |= {"source": "radiosity", "gather": "exact", "timeout_ms": 1000}
-    answer = client.get(f"{settled}/lightmap", params=query)
+
+
+def test_what_is_not_within_the_tolerance_in_time_says_so(client: TestClient) -> None:
+    path = open_box(client, error_tolerance=1e-5)
+    query: dict[str, str | float] = {"density": 20, "format": "png", "source": "vpl", "timeout_ms": 2000}
+    answer = client.get(f"{path}/lightmap", params=query)
     assert answer.status_code == 200, answer.text
     assert answer.headers["x-converged"] == "false"
-    assert answer.headers["x-method"] == "solution"
+    assert client.delete(path).status_code == 204
 
 
 def test_an_edit_is_in_the_next_lightmap(client: TestClient, session: str) -> None:
