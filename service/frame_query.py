@@ -9,6 +9,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from service.bounded_wait import BoundedWait
 from service.camera_query import CameraQuery
 from service.negotiation import FrameFormat
 from solver.engine.requests import (
@@ -42,7 +43,7 @@ WaitText: TypeAlias = Annotated[
 ]
 
 
-class FrameQuery(CameraQuery):
+class FrameQuery(CameraQuery, BoundedWait):
     """What to show, how, and when."""
 
     renderer: RendererName | None = Field(
@@ -99,6 +100,6 @@ class FrameQuery(CameraQuery):
             return Wait(WaitFor.CONVERGED)
         return self.wait
 
-    def longest_ms(self, most: float) -> float:
-        """How long it may be waited for, at most `most` ms."""
-        return min(most, *(bound for bound in (self.timeout_ms, self.budget_ms) if bound is not None), most)
+    def longest(self, most_ms: float) -> float:
+        """Seconds that it may wait, where the service allows `most_ms`."""
+        return super().longest(most_ms if self.budget_ms is None else min(self.budget_ms, most_ms))

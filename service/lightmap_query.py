@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from service.bounded_wait import BoundedWait
 from service.overlay_query import OverlayWait
 from solver.engine.lightmaps.bake import Gather, LightmapRequest, LightmapSource
 from solver.engine.lightmaps.files import LightmapFormat
 
 
-class LightmapQuery(BaseModel):
+class LightmapQuery(BoundedWait):
     """How fine, by which light, and as what."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -48,13 +49,6 @@ class LightmapQuery(BaseModel):
         default=OverlayWait.CONVERGED,
         description="`converged`: when it is within the tolerance of the settings, or cannot be improved; "
         "`none`: as soon as all texels have a first estimate.",
-    )
-    timeout_ms: float | None = Field(
-        default=None,
-        ge=0.0,
-        allow_inf_nan=False,
-        description="Bounds every wait; then comes what there is, or 409 where there is nothing to show yet. "
-        "The service has a bound of its own, ten minutes unless configured otherwise.",
     )
 
     def request(self) -> LightmapRequest:

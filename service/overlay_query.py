@@ -6,8 +6,9 @@ from abc import ABC, abstractmethod
 from enum import StrEnum
 from typing import Annotated, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from service.bounded_wait import BoundedWait
 from service.camera_query import CameraQuery
 from service.problems import INVALID, ProblemError
 from solver.document.fields import MAX_COORDINATE
@@ -46,7 +47,7 @@ class OverlayWait(StrEnum):
     CONVERGED = "converged"
 
 
-class OverlayQuery(BaseModel, ABC):
+class OverlayQuery(BoundedWait, ABC):
     """What every overlay may be asked with."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -60,13 +61,6 @@ class OverlayQuery(BaseModel, ABC):
         default=OverlayWait.NONE,
         description="`none`: as soon as there is anything to show; `converged`: when the solution rests, and "
         "all that the camera sees is built, so that numbers of elements, links and triangles stay.",
-    )
-    timeout_ms: float | None = Field(
-        default=None,
-        ge=0.0,
-        allow_inf_nan=False,
-        description="Bounds every wait; then comes what there is, or 409 where there is nothing to show yet. "
-        "The service has a bound of its own, ten minutes unless configured otherwise.",
     )
 
     @abstractmethod

@@ -59,7 +59,7 @@ async def session_frame(
         frame=query.frame(),
         encoding=query.encoding(chosen),
         wait=query.waiting(),
-        timeout=query.longest_ms(float(context.settings.max_wait_ms)) / 1000.0,
+        timeout=query.longest(float(context.settings.max_wait_ms)),
         known_tags=known_tags(if_none_match),
     )
     answer = await unless_gone(request, session.worker.call(asked))

@@ -63,14 +63,12 @@ async def session_lightmap(
 ) -> Response:
     """The irradiance of all surfaces of the scene as it stands, baked into one picture."""
     chosen = query.format or choose_lightmap_format(accept)
-    longest = float(context.settings.max_wait_ms)
-    timeout_ms = longest if query.timeout_ms is None else min(query.timeout_ms, longest)
     asked = GetLightmap(
         lightmap=query.request(),
         format=chosen,
         white=query.white,
         complete=query.wait is OverlayWait.CONVERGED,
-        timeout=timeout_ms / 1000.0,
+        timeout=query.longest(float(context.settings.max_wait_ms)),
     )
     answer = await unless_gone(request, session.worker.call(asked))
     headers = _headers_of(answer) if query.format else {**_headers_of(answer), "Vary": "Accept"}

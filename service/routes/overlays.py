@@ -39,8 +39,7 @@ class Showing:
     async def __call__(self, query: queries.OverlayQuery) -> Response:
         """The answer to `query`. Raises ProblemError, RefusedError, WorkerGoneError."""
         chosen = query.format or choose_overlay_format(self._accept)
-        timeout_ms = self._longest if query.timeout_ms is None else min(query.timeout_ms, self._longest)
-        asked = GetOverlay(query.request(), chosen, timeout_ms / 1000.0)
+        asked = GetOverlay(query.request(), chosen, query.longest(self._longest))
         answer = await unless_gone(self._request, self._session.worker.call(asked))
         headers = {"Cache-Control": "no-cache"} | ({} if query.format else {"Vary": "Accept"})
         return Response(answer.content, media_type=OVERLAY_TYPES[chosen], headers=headers)
