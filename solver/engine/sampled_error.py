@@ -45,11 +45,6 @@ class SampledError:
         """Relative error of the reflected radiosity, 0 to 1."""
         return min(1.0, float(np.sqrt((self.noise + self.variation).max())))
 
-    @property
-    def relative_variation(self) -> float:
-        """The part of it that no paths but only smaller elements would take away."""
-        return min(1.0, float(np.sqrt(self.variation.max())))
-
 
 def sampled_error(
     reflected: FloatArray, variance: FloatArray, area: FloatArray, parent: IntArray, reflects: BoolArray

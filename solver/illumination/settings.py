@@ -7,6 +7,7 @@ inside of their triangle (`samples.NUDGE`, parameter 10), where the irradiance i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from enum import StrEnum
 
@@ -55,6 +56,11 @@ class LightSettings(SolverSettings):
         if self.interpolation_error is not None:
             return self.interpolation_error
         return 0.5 * self.error_tolerance
+
+    @property
+    def vpl_bound(self) -> float:
+        """Of cos cos' / r^2 of a virtual light, with lengths in diameters of the scene: by `vpl_reach`."""
+        return 1.0 / self.vpl_reach**2 if self.vpl_reach > 0.0 else math.inf
 
     def solves_as(self, other: LightSettings) -> bool:
         """Whether a solve by these is one by `other`."""

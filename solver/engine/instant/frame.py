@@ -17,29 +17,23 @@ from numpy.typing import NDArray
 
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
 from solver.engine.instant.image import Image, joined
+from solver.engine.instant.nearby import HELPERS, PATHS_PER_RAY, nearby_light
 from solver.engine.instant.points import GlossyPoints, LitPoints, matched
 from solver.engine.instant.resolve import add_radiance, add_to_pixels
+from solver.engine.instant.spread import Spread
 from solver.geometry.scene import Camera
 from solver.illumination.particles.compensation import Known, NearbyLight
-from solver.illumination.particles.glossy import GlossyLight
-from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.receivers import Receivers
 from solver.rendering.surface_points import SurfacePoints
 from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, Int64Array
 
 T = TypeVar("T", bound=np.generic)
 
-PATHS_PER_RAY: Final = 32
-"""Paths of a block for each ray that a pixel sends to what is near."""
-
 PATHS_PER_LOBE: Final = 8
 """Paths of a block for each ray that a pixel sends by a narrow lobe: lamps are found by these alone."""
 
-_HELPERS: Final = 4
-"""Batches of lights that light up what rays to what is near meet."""
-
 _LOBE_HELPERS: Final = 1
-"""The same of rays by lobes, of which there are more."""
+"""Batches of lights that light up what rays by lobes meet, of which there are many."""
 
 _AT_ONCE: Final = 1 << 15
 """Rays to what is near between two yields."""
@@ -84,9 +78,7 @@ class InstantFrame:
         self._stream = [p.keys(pixels) * len(points) + k for k, p in enumerate(self._points)]
         self._ring: list[Image | None] = [None] * RING
         self._rest: Image | None = None
-        self._spread = 0.0
-        self._judged = 0
-        self._estimate = 1.0
+        self._spread = Spread()
         self._turn = 0
         self._lobe_turn = 0
         self._emitted: list[FloatArray] | None = None
@@ -107,7 +99,7 @@ class InstantFrame:
     @property
     def error_estimate(self) -> float:
         """Relative RMS error of reflected light; 1 while nothing is known of it."""
-        return self._estimate if self.is_new else 1.0
+        return self._spread.estimate if self.is_new else 1.0
 
     @property
     def paths(self) -> int:
@@ -230,33 +222,15 @@ class InstantFrame:
                 image.gloss[sample][:, glossy.broad] += light
             yield
         if self._settings.compensates and np.isfinite(bound):
-            yield from self._compensate(image, block, self._nearby(block, _HELPERS))
+            yield from self._compensate(image, block, self._nearby(block, HELPERS))
         if any(len(glossy.narrow) > 0 for glossy in self._glossy):
             yield from self._send_lobes(image, block, self._nearby(block, _LOBE_HELPERS))
 
     def _nearby(self, block: LightBlock, helpers: int) -> NearbyLight:
         """What rays of a block come upon, by so many batches, and what its lights leave out."""
-        world, bound = self._blocks.world, self._settings.bound
-        helper = self._blocks.kept(block)
-        batches = len(helper.sights)
-
-        def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
-            # Other lights each time, so that in the mean all of them shine there.
-            light = np.zeros((3, len(receivers)), dtype=np.float32)
-            for k in range(min(helpers, batches)):
-                batch = (turn * helpers + k) % batches
-                factor = max(1.0, batches / helpers)
-                self._blocks.shine(light, receivers, helper, batch, bound, factor, gloss)
-            return light
-
-        def shine(receivers: Receivers, turn: int) -> Float32Array:
-            return polish(receivers, None, turn)
-
-        surfaces, polygons = world.surfaces, self._blocks.polygons
-        glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
-        bound = bound if self._settings.compensates else np.inf
-        bounds = (block.emission_bound, helper.emission_bound)
-        return NearbyLight(surfaces, polygons, world.rays, bound, shine, self._known(), glossy, bounds)
+        bound = self._settings.bound
+        reach_bound = bound if self._settings.compensates else np.inf
+        return nearby_light(self._blocks, block, bound, reach_bound, self._known(), helpers)
 
     def _compensate(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
         """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples."""
@@ -303,14 +277,8 @@ class InstantFrame:
         before = sum(image.paths for image in images)
         known = self._reflected(self._mean(images), self._mean_gloss(images))
         new = self._reflected(fresh.light, fresh.gloss)
-        after = before + fresh.paths
-        apart = float(np.mean((known - new) ** 2)) * before * fresh.paths / after
-        self._spread += fresh.paths * apart
-        self._judged += fresh.paths
-        mean = (before * known + fresh.paths * new) / after
-        power = float(np.mean(mean**2))
-        squared = self._spread / self._judged / after
-        self._estimate = min(1.0, float(np.sqrt(squared / power))) if power > 0.0 else 0.0
+        mean = (before * known + fresh.paths * new) / (before + fresh.paths)
+        self._spread.learn(before, fresh.paths, float(np.mean((known - new) ** 2)), float(np.mean(mean**2)))
 
     def _reflected(self, light: list[Float32Array], gloss: list[Float32Array]) -> FloatArray:
         """Luminance (h w,) of what pixels reflect."""

@@ -127,9 +127,8 @@ class InstantFrames:
             random = np.random.default_rng(samples)
             offsets = pattern_points(Pattern.JITTERED_HAMMERSLEY, samples, 1, random)[0] - 0.5
         points = [device.surface_points(mesh, camera, (right, down)) for right, down in offsets.tolist()]
-        reach = self._settings.vpl_reach
         settings = InstantSettings(
-            bound=1.0 / reach**2 if reach > 0.0 else math.inf,
+            bound=self._settings.vpl_bound,
             compensates=self._settings.vpl_compensation is not Compensation.NONE,
         )
         surfaces = world.surfaces

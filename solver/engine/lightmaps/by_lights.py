@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from solver.engine.instant.blocks import LightBlock, LightBlocks, block_paths
+from solver.engine.instant.nearby import PATHS_PER_RAY, nearby_light
+from solver.engine.instant.spread import Spread
 from solver.engine.lightmaps.bake import Bake, LightmapRequest, LightmapSource
 from solver.engine.world import World
 from solver.illumination.lightmaps.texels import Texels
-from solver.illumination.particles.compensation import Known, NearbyLight
-from solver.illumination.particles.glossy import GlossyLight
-from solver.illumination.particles.light_lobes import Gloss
+from solver.illumination.particles.compensation import Known
 from solver.illumination.particles.receivers import Receivers
 from solver.illumination.settings import Compensation, LightSettings
 from solver.types import LUMINANCE_WEIGHTS, Float32Array, Int64Array
-
-PATHS_PER_RAY: Final = 32
-"""Paths of a block for each ray that a texel sends to what is near."""
-
-_HELPERS: Final = 4
-"""Batches of lights that light up what such rays meet."""
 
 _PART: Final = 1 << 16
 """Texels lit between two yields."""
@@ -46,12 +39,10 @@ class LightsBake(Bake):
         super().__init__(world, revision, request)
         self._settings = settings
         self._known = known
-        reach = settings.vpl_reach
-        self._bound = 1.0 / reach**2 if reach > 0.0 else math.inf
+        self._bound = settings.vpl_bound
         self._parts: list[Float32Array] = []
         self._paths = 0
-        self._spread, self._judged = 0.0, 0
-        self._estimate = 1.0
+        self._spread = Spread()
         self._turn = 0
 
     @property
@@ -63,18 +54,18 @@ class LightsBake(Bake):
     def progress(self) -> float:
         """The variance that is to be reached over the present one, or the share of the paths allowed."""
         settings = self._settings
-        variance = (settings.error_tolerance / max(self._estimate, settings.error_tolerance)) ** 2
+        variance = (settings.error_tolerance / max(self._spread.estimate, settings.error_tolerance)) ** 2
         return 1.0 if self.is_over else max(variance, min(1.0, self._paths / settings.max_paths))
 
     @property
     def error_estimate(self) -> float:
         """By how the blocks differ."""
-        return self._estimate
+        return self._spread.estimate
 
     @property
     def converged(self) -> bool:
         """Whether the error is within the tolerance."""
-        return self._estimate <= self._settings.error_tolerance
+        return self._spread.estimate <= self._settings.error_tolerance
 
     @property
     def method(self) -> str:
@@ -117,7 +108,7 @@ class LightsBake(Bake):
         self, blocks: LightBlocks, block: LightBlock, texels: Texels, light: list[Float32Array]
     ) -> Iterator[None]:
         """Add what bounded lights leave out: a ray for every `PATHS_PER_RAY` paths, over the texels."""
-        near = self._nearby(blocks, block, blocks.kept(block))
+        near = nearby_light(blocks, block, self._bound, self._bound, self._known)
         rays, every = max(1, block.paths // PATHS_PER_RAY), max(1, PATHS_PER_RAY // block.paths)
         for ray in range(rays):
             turn = self._turn + ray
@@ -128,26 +119,6 @@ class LightsBake(Bake):
                 lit[:, asked] += np.float32(every / rays) * near.at(at, patch, stream[asked], turn)
                 yield
         self._turn += rays
-
-    def _nearby(self, blocks: LightBlocks, block: LightBlock, helper: LightBlock) -> NearbyLight:
-        """What short rays come upon, lit by batches of `helper`, others each time: what `block` misses."""
-        world, polygons = self._world, blocks.polygons
-        surfaces, batches = world.surfaces, len(helper.sights)
-
-        def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
-            found = np.zeros((3, len(receivers)), dtype=np.float32)
-            factor = max(1.0, batches / _HELPERS)
-            for k in range(min(_HELPERS, batches)):
-                batch = (turn * _HELPERS + k) % batches
-                blocks.shine(found, receivers, helper, batch, self._bound, factor, gloss)
-            return found
-
-        def shine(receivers: Receivers, turn: int) -> Float32Array:
-            return polish(receivers, None, turn)
-
-        glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
-        bounds = (block.emission_bound, helper.emission_bound)
-        return NearbyLight(surfaces, polygons, world.rays, self._bound, shine, self._known, glossy, bounds)
 
     def _add(self, light: list[Float32Array], paths: int) -> None:
         """Take a block into the mean, and learn from how it differs from those before."""
@@ -160,10 +131,7 @@ class LightsBake(Bake):
             mean += np.float32(paths / after) * fresh
             square += float(np.sum((LUMINANCE_WEIGHTS @ mean) ** 2))
         if self._paths > 0:
-            self._spread += paths * apart * self._paths * paths / after
-            self._judged += paths
-            variance = self._spread / self._judged / after
-            self._estimate = min(1.0, math.sqrt(variance / square)) if square > 0.0 else 0.0
+            self._spread.learn(self._paths, paths, apart, square)
         self._paths = after
 
 

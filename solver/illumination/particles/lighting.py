@@ -4,8 +4,8 @@ Each light adds P / pi cos cos' / r^2 to what sees it, with the product of cosin
 light it grows without limit ([K 5]), and what the bound takes away is put back by `compensation`.
 
 A graphics card would do this as a pass over the screen. On a processor, where shaders run on the same cores
-as kernels but pay for both sides of every branch, a kernel does it six times as fast; and it lights whatever
-points there are, texels of lightmaps and ends of rays too.
+as kernels but pay for both sides of every branch, a kernel does it some 15 times as fast; and it lights
+whatever points there are, texels of lightmaps and ends of rays too.
 """
 
 from __future__ import annotations

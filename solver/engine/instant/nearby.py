@@ -1,0 +1,52 @@
+"""What short rays come upon, lit by the lights of a block: for pixels and texels alike."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from solver.engine.instant.blocks import LightBlock, LightBlocks
+from solver.illumination.particles.compensation import Known, NearbyLight
+from solver.illumination.particles.glossy import GlossyLight
+from solver.illumination.particles.light_lobes import Gloss
+from solver.illumination.particles.receivers import Receivers
+from solver.types import Float32Array
+
+PATHS_PER_RAY: Final = 32
+"""Paths of a block for each ray that a point sends to what is near."""
+
+HELPERS: Final = 4
+"""Batches of lights that light up what such rays meet."""
+
+
+def nearby_light(
+    blocks: LightBlocks,
+    block: LightBlock,
+    bound: float,
+    reach_bound: float,
+    known: Known | None,
+    helpers: int = HELPERS,
+) -> NearbyLight:
+    """Puts back what the lights of `block`, bounded by `bound`, leave out within the reach of `reach_bound`.
+
+    Where rays end `helpers` batches of lights shine, others each time, so that in the mean all of them do.
+    """
+    world, polygons = blocks.world, blocks.polygons
+    surfaces = world.surfaces
+    helper = blocks.kept(block)
+    batches = len(helper.sights)
+
+    def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
+        light = np.zeros((3, len(receivers)), dtype=np.float32)
+        for k in range(min(helpers, batches)):
+            batch = (turn * helpers + k) % batches
+            blocks.shine(light, receivers, helper, batch, bound, max(1.0, batches / helpers), gloss)
+        return light
+
+    def shine(receivers: Receivers, turn: int) -> Float32Array:
+        return polish(receivers, None, turn)
+
+    glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
+    bounds = (block.emission_bound, helper.emission_bound)
+    return NearbyLight(surfaces, polygons, world.rays, reach_bound, shine, known, glossy, bounds)
