@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
 from solver.engine.instant.image import Image, joined
-from solver.engine.instant.nearby import HELPERS, PATHS_PER_RAY, nearby_light
+from solver.engine.instant.nearby import HELPERS, PATHS_PER_RAY, nearby_light, shared_rays
 from solver.engine.instant.points import GlossyPoints, LitPoints, matched
 from solver.engine.instant.resolve import add_radiance, add_to_pixels
 from solver.engine.instant.spread import Spread
@@ -233,20 +233,27 @@ class InstantFrame:
         return nearby_light(self._blocks, block, bound, reach_bound, self._known(), helpers)
 
     def _compensate(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
-        """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples."""
+        """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples.
+
+        Of blocks with fewer paths neighbours share a ray, another's each time.
+        """
         rays = max(1, round(block.paths / (PATHS_PER_RAY * len(self._points))))
         every = max(1, round(PATHS_PER_RAY * len(self._points) / block.paths))
         for sample, points in enumerate(self._points):
             for ray in range(rays):
                 turn = self._turn + ray
-                asked = np.flatnonzero((self._stream[sample] + self._turn) % every == 0).astype(np.int32)
+                start, asked = shared_rays(points.patch, every, self._turn)
                 for first in range(0, len(asked), _AT_ONCE):
                     part = asked[first : first + _AT_ONCE]
                     stream = self._stream[sample][part]
                     found, along = near.sample(points.position[part], points.patch[part], stream, turn)
-                    found *= np.float32(every / rays)
-                    image.light[sample][:, part] += found
-                    self._glossy[sample].add_sampled(image.gloss[sample], part, found, along)
+                    # What one finds is for all that stand beside it.
+                    run = start[first : first + len(part) + 1]
+                    found = np.repeat(found, np.diff(run), axis=1) * np.float32(1.0 / rays)
+                    rows = np.arange(run[0], run[-1], dtype=np.int32)
+                    image.light[sample][:, run[0] : run[-1]] += found
+                    along = np.repeat(along, np.diff(run), axis=0)
+                    self._glossy[sample].add_sampled(image.gloss[sample], rows, found, along)
                     yield
         self._turn += rays
 

@@ -11,7 +11,7 @@ from solver.illumination.particles.compensation import Known, NearbyLight
 from solver.illumination.particles.glossy import GlossyLight
 from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.receivers import Receivers
-from solver.types import Float32Array
+from solver.types import Float32Array, Int64Array, IntArray
 
 PATHS_PER_RAY: Final = 32
 """Paths of a block for each ray that a point sends to what is near."""
@@ -50,3 +50,16 @@ def nearby_light(
     glossy = GlossyLight(surfaces, polygons, world.rays, polish) if surfaces.has_specular else None
     bounds = (block.emission_bound, helper.emission_bound)
     return NearbyLight(surfaces, polygons, world.rays, reach_bound, shine, known, glossy, bounds)
+
+
+def shared_rays(patch: IntArray, every: int, turn: int) -> tuple[Int64Array, IntArray]:
+    """Where runs of up to `every` neighbours on one patch (n,) begin (k + 1,), and who sends its ray (k,).
+
+    Neighbours in a list of points are near each other. Without runs one in `every` points would be that many
+    times as bright, and the others too dark, until all have had their turn.
+    """
+    n = len(patch)
+    begins = np.ones(n, dtype=np.bool_)
+    begins[1:] = (patch[1:] != patch[:-1]) | (np.arange(1, n) % every == 0)
+    start = np.append(np.flatnonzero(begins), n)
+    return start, (start[:-1] + turn % np.diff(start)).astype(np.int32)
