@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.frames import HEIGHT, WIDTH
 from benchmarks.instant import frame_of
 from benchmarks.plan import Job, Options, Section
-from benchmarks.tables import Row, Table
+from benchmarks.tables import Row, Table, Target
 from solver.document.samples import load_sample
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
@@ -23,8 +23,14 @@ from solver.geometry.scene import Camera
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
 
 SCENE: Final = "office"
+RATE: Final = 10.0
+"""Target: frames a second of those that are given a tenth of a second"""
+
 BUDGETS: Final = (0.0, 0.1, 0.3)
 """Seconds that a frame is given; one block of lights it has in any case"""
+
+_JUDGED: Final = 0.1
+"""The one of them that the target is for"""
 
 _STEP: Final = 0.02
 """Metres between two frames"""
@@ -114,7 +120,8 @@ def tabulate(found: list[WalkthroughFigures]) -> Table:
                     f"{figures.paths:.0f}",
                     f"{figures.points:.0f}",
                     f"{100.0 * figures.error:.1f} %",
-                )
+                ),
+                (Target("rate", figures.rate, RATE, at_most=False),) if figures.budget == _JUDGED else (),
             )
             for figures in found
         ),
