@@ -84,15 +84,18 @@ class RayScene:
         start = self.to_local(origins)
         return self.occluded_local(start, self.to_local(targets) - start)
 
-    def first_local(self, origins: Float32Array, directions: Float32Array) -> IntArray:
-        """The first triangle (n,), or -1, from `origins` along `directions`, (n, 3) local float32 each."""
+    def first_local(self, origins: Float32Array, directions: Float32Array, reach: float = _FAR) -> IntArray:
+        """The first triangle (n,), or -1, from `origins` along `directions`, (n, 3) local float32 each.
+
+        What is farther than `reach`, in lengths of the direction, is not seen.
+        """
         triangle = np.full(len(origins), -1, dtype=np.int32)
         if self._empty:
             return triangle
 
         def query(start: int, stop: int) -> None:
             triangle[start:stop] = self._scene.run(
-                origins[start:stop], directions[start:stop], query="INTERSECT"
+                origins[start:stop], directions[start:stop], dists=reach, query="INTERSECT"
             )
 
         run_chunks(query, len(origins), CHUNK, _LEAST)

@@ -14,19 +14,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, TypeAlias
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.glossy import GlossyLight, lobe_axis
-from solver.illumination.particles.hemisphere import tangent_frames
-from solver.illumination.particles.mirror_ways import Ends, follow, is_glossy
+from solver.illumination.particles.mirror_ways import Ends, has_mirrors, is_glossy
 from solver.illumination.particles.receivers import Polygons, Receivers
+from solver.illumination.particles.short_ray_kernels import BOUNCES
+from solver.illumination.particles.short_rays import ShortRays
 from solver.kernels import kernel
 from solver.types import LUMINANCE_WEIGHTS, BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.rays import RayScene
-from solver.visibility.sampling import fraction_of, hash_index
+from solver.visibility.sampling import hash_index
 
 Shine: TypeAlias = Callable[[Receivers, int], Float32Array]
 """Irradiance (3, n) W/m2 of receivers by bounded lights, right in the mean over the turns 0, 1, ..."""
@@ -41,12 +43,6 @@ _GOES_ON: Final = 0.5
 """Share of the ends of rays from which another is sent, from the second on: all of the first send one, or
 corners become noisy."""
 
-_BOUNCES: Final = 16
-"""After so many rays in a row light is left out; each is short, and few meet anything."""
-
-# The plastic number's sequence (Roberts 2018), in two dimensions.
-_FIRST: Final = 0.7548776662466927
-_SECOND: Final = 0.5698402909980532
 _UNIT: Final = 2.0**-31
 
 
@@ -85,29 +81,13 @@ class NearbyLight:
         Lights are bounded by the way from their images too: rays go on at mirrors for as far as they reach.
         """
         added = np.zeros((3, len(patch)), dtype=np.float32)
-        s = self.surfaces
-        if len(patch) == 0 or not np.isfinite(self.bound) or bounce >= _BOUNCES:
-            return added, s.normal[patch]
-        directions = _directions(s.normal[patch], stream, turn, bounce)
-        reach = s.size / np.sqrt(self.bound)
-        # Away from the surface, so that no ray meets it again.
-        start = positions + (self.rays.offset / self.rays.scale) * s.normal[patch]
-        ends = follow(s, self.rays, start, directions, reach)
-        here = np.einsum("na,na->n", directions[ends.row], s.normal[patch[ends.row]])
-        there = np.abs(np.einsum("na,na->n", ends.along, s.normal[ends.patch]))
-        kernel_value = here * there * (s.size / np.maximum(ends.distance, 1e-30)) ** 2
-        share = _left_out(kernel_value, self.bound)
-        chosen = np.flatnonzero(share > 0.0)
-        ends, share, kernel_value = ends.take(chosen), share[chosen], kernel_value[chosen]
-        emitted = share
-        if self.emission_bounds is not None:
-            least = self.emission_bounds[0 if bounce == 0 else 1]
-            emitted = _left_out(kernel_value, np.maximum(self.bound, least[ends.patch]))
-        light = ends.weight * self.leaving(ends, stream[ends.row], turn, bounce, share, emitted)
-        for depth in range(int(ends.depth.max(initial=0)) + 1):
-            rows = np.flatnonzero(ends.depth == depth)
-            added[:, ends.row[rows]] += light[rows].T
-        return added, directions
+        if len(patch) == 0 or not np.isfinite(self.bound) or bounce >= BOUNCES:
+            return added, self.surfaces.normal[patch]
+        met = self._short.send(positions, patch, stream, turn, bounce, self._least(bounce))
+        ends = met.ends
+        light = self.leaving(ends, stream[ends.row], turn, bounce, met.share, met.emitted)
+        _add(ends.row, ends.weight, light, added)
+        return added, met.directions
 
     def leaving(
         self,
@@ -123,34 +103,50 @@ class NearbyLight:
         Where given, it is the `share` (k,) of what is reflected there, and `emitted` (k,) of what is emitted.
         """
         s, met = self.surfaces, ends.patch
-        there = np.abs(np.einsum("na,na->n", ends.along, s.normal[met]))
-        lobe = 0.5 * (s.emission_exponent[met] + 2.0) * there ** s.emission_exponent[met]
-        light = np.zeros((len(met), 3))
-        lit = np.flatnonzero(s.reflectance[met].any(axis=1)).astype(np.int32)
-        light[lit] += s.reflectance[met[lit]] * self._irradiance(
-            ends.position[lit], met[lit], stream[lit], turn, bounce
-        )
+        whole = np.broadcast_to(1.0, len(met))
+        share = whole if share is None else share
+        emitted = whole if emitted is None else emitted
+        lit = self._irradiance(ends.position, met, stream, turn, bounce)
+        light = np.empty((len(met), 3))
+        _leave(
+            met, ends.along, s.normal, s.reflectance, s.emission, s.emission_exponent, lit, share, emitted,
+            light,
+        )  # fmt: skip
         if self.glossy is not None:
             lobed = np.flatnonzero(is_glossy(s, met))
             axis = lobe_axis(s, met[lobed], ends.along[lobed])
-            light[lobed] += (
-                s.specular[met[lobed]]
-                * self.glossy.at(
-                    self, ends.position[lobed], met[lobed], axis, stream[lobed], turn, bounce + 1
-                ).T
+            gloss = self.glossy.at(
+                self, ends.position[lobed], met[lobed], axis, stream[lobed], turn, bounce + 1
             )
-        if share is not None:
-            light *= share[:, None]
-        lobe *= 1.0 if emitted is None else emitted
-        return np.asarray(light + s.emission[met] * lobe[:, None])
+            light[lobed] += share[lobed, None] * s.specular[met[lobed]] * gloss.T
+        return light
+
+    @cached_property
+    def _short(self) -> ShortRays:
+        return ShortRays(self.surfaces, self.rays, self.bound, has_mirrors(self.surfaces))
+
+    @cached_property
+    def _is_matt(self) -> BoolArray:
+        """Whether patches (p,) reflect diffusely at all."""
+        return np.asarray(self.surfaces.reflectance.any(axis=1))
+
+    def _least(self, bounce: int) -> FloatArray:
+        if self.emission_bounds is None:
+            return np.zeros(self.surfaces.patch_count)
+        return self.emission_bounds[0 if bounce == 0 else 1]
 
     def _irradiance(
         self, positions: Points, patch: IntArray, stream: Int64Array, turn: int, bounce: int
-    ) -> FloatArray:
-        if len(patch) == 0:
-            return np.empty((0, 3))
+    ) -> Float32Array:
+        """Irradiance (3, k) W/m2 at points (k, 3); 0 where nothing is reflected."""
+        matt = np.flatnonzero(self._is_matt[patch])
+        if len(matt) < len(patch):
+            light = np.zeros((3, len(patch)), dtype=np.float32)
+            if len(matt) > 0:
+                light[:, matt] = self._irradiance(positions[matt], patch[matt], stream[matt], turn, bounce)
+            return light
         if self.known is not None:
-            return self.known(positions, patch)
+            return np.ascontiguousarray(self.known(positions, patch).T, dtype=np.float32)
         lit = self.shine(Receivers.on(self.polygons, positions, patch), turn)
         if bounce == 0:
             lit += self.at(positions, patch, stream, turn, 1)
@@ -161,7 +157,7 @@ class NearbyLight:
             rows = np.flatnonzero(going)
             again = self.at(positions[rows], patch[rows], stream[rows], turn, bounce + 1)
             lit[:, rows] += again * np.float32(1.0 / _GOES_ON)
-        return np.asarray(lit.T, dtype=np.float64)
+        return lit
 
 
 def emission_bounds(surfaces: Surfaces, paths: int) -> FloatArray:
@@ -177,35 +173,43 @@ def emission_bounds(surfaces: Surfaces, paths: int) -> FloatArray:
     return np.asarray(_SPOT * np.pi * paths * exitance * surfaces.size**2 / power)
 
 
-def _left_out(kernel_value: FloatArray, bound: FloatArray | float) -> FloatArray:
-    """Share (k,) that a bound takes away from cos cos' / r^2 (k,)."""
-    return np.maximum(1.0 - bound / np.maximum(kernel_value, 1e-30), 0.0)
-
-
-def _directions(normal: FloatArray, stream: Int64Array, turn: int, bounce: int) -> FloatArray:
-    """Cosine-distributed unit directions (n, 3) about normals (n, 3)."""
-    tangent, other = tangent_frames(normal)
-    local = np.empty((len(normal), 3))
-    _draw(stream, turn, bounce, local)
-    return np.asarray(local[:, :1] * tangent + local[:, 1:2] * other + local[:, 2:] * normal)
-
-
 @kernel
 def _draw_some(stream: Int64Array, turn: int, bounce: int, chosen: BoolArray) -> None:
     """Choose `_GOES_ON` of all (n,), others in each turn."""
     for i in range(len(stream)):
-        h = hash_index((np.int64(stream[i]) * _BOUNCES + bounce) * 0x100003 + turn)
+        h = hash_index((np.int64(stream[i]) * BOUNCES + bounce) * 0x100003 + turn)
         chosen[i] = (h & 0x7FFFFFFF) * _UNIT < _GOES_ON
 
 
 @kernel
-def _draw(stream: Int64Array, turn: int, bounce: int, local: FloatArray) -> None:
-    """Directions (n, 3) about z: one sequence, shifted for each stream."""
-    for i in range(len(stream)):
-        h = hash_index(np.int64(stream[i]) * _BOUNCES + bounce)
-        u = fraction_of((h & 0x7FFFFFFF) * _UNIT + turn * _FIRST)
-        v = fraction_of(((h >> 31) & 0x7FFFFFFF) * _UNIT + turn * _SECOND)
-        radius = np.sqrt(u)
-        local[i, 0] = radius * np.cos(2.0 * np.pi * v)
-        local[i, 1] = radius * np.sin(2.0 * np.pi * v)
-        local[i, 2] = np.sqrt(1.0 - u)
+def _leave(
+    patch: IntArray,
+    along: FloatArray,
+    normal: FloatArray,
+    reflectance: FloatArray,
+    emission: FloatArray,
+    exponent: FloatArray,
+    lit: Float32Array,
+    share: FloatArray,
+    emitted: FloatArray,
+    light: FloatArray,
+) -> None:
+    """The light (k, 3) of matt reflection of the irradiance `lit` (3, k), and of emission, along (k, 3)."""
+    for i in range(len(patch)):
+        p = patch[i]
+        lobe = emitted[i]
+        if exponent[p] != 0.0:
+            there = 0.0
+            for axis in range(3):
+                there += along[i, axis] * normal[p, axis]
+            lobe *= 0.5 * (exponent[p] + 2.0) * abs(there) ** exponent[p]
+        for c in range(3):
+            light[i, c] = share[i] * reflectance[p, c] * lit[c, i] + lobe * emission[p, c]
+
+
+@kernel
+def _add(row: Int64Array, weight: FloatArray, light: FloatArray, added: Float32Array) -> None:
+    """Add weight (k, 3) times light (k, 3) to the columns `row` (k,) of added (3, n)."""
+    for i in range(len(row)):
+        for c in range(3):
+            added[c, row[i]] += weight[i, c] * light[i, c]

@@ -51,6 +51,11 @@ def is_mirror(surfaces: Surfaces, patch: IntArray) -> BoolArray:
     return np.asarray(np.isinf(surfaces.exponent[patch]) & surfaces.specular[patch].any(axis=1))
 
 
+def has_mirrors(surfaces: Surfaces) -> bool:
+    """Whether any patch is a perfect mirror."""
+    return bool(np.any(np.isinf(surfaces.exponent) & surfaces.specular.any(axis=1)))
+
+
 def is_glossy(surfaces: Surfaces, patch: IntArray) -> BoolArray:
     """Whether patches (n,) reflect by lobes."""
     return np.asarray(np.isfinite(surfaces.exponent[patch]) & surfaces.specular[patch].any(axis=1))
