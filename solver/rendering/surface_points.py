@@ -47,23 +47,21 @@ def surface_points(patch: IntArray, surfaces: Surfaces, eye: Vector, rays: Pixel
     A pixel that a patch just touches, seen edge on, can miss its plane: its point is then the patch's middle.
     """
     height, width = patch.shape
-    order = _tiles(height, width)
-    shown = patch.ravel()[order]
-    pixel = order[shown >= 0].astype(np.int32)
-    found = patch.ravel()[pixel]
-    position = np.empty((len(pixel), 3))
+    pixel, found = np.empty(height * width, dtype=np.int32), np.empty(height * width, dtype=np.int32)
+    n = _list(_tiles(height, width), np.ascontiguousarray(patch).ravel(), pixel, found)
+    pixel, found = pixel[:n], found[:n]
+    position = np.empty((n, 3))
     corners = (surfaces.corners - surfaces.center) / surfaces.size
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
     run_chunks(
         lambda start, stop: _meet(
-            start, stop, pixel, found, width, eye, rays, surfaces.normal, middle, radius, position
+            start, stop, pixel, found, width, eye, rays, surfaces.normal, middle, radius, surfaces.center,
+            surfaces.size, position,
         ),
-        len(pixel),
+        n,
         _CHUNK,
-    )
-    position *= surfaces.size
-    position += surfaces.center
+    )  # fmt: skip
     return SurfacePoints((width, height), pixel, found, position)
 
 
@@ -78,6 +76,16 @@ def _tiles(height: int, width: int) -> IntArray:
 
 
 @kernel
+def _list(order: IntArray, patch: IntArray, pixel: IntArray, found: IntArray) -> int:
+    """Pixels (n,) in that order that show a patch (h w,), and the patches (n,); how many there are."""
+    count = 0
+    for i in order:
+        pixel[count], found[count] = i, patch[i]
+        count += patch[i] >= 0
+    return count
+
+
+@kernel
 def _meet(
     start: int,
     stop: int,
@@ -89,8 +97,11 @@ def _meet(
     normal: FloatArray,
     middle: Points,
     radius: FloatArray,
+    center: Vector,
+    size: float,
     position: Points,
 ) -> None:
+    """World points (n, 3) of the pixels [start, stop)."""
     for i in range(start, stop):
         row = pixel[i] // width
         column = pixel[i] - row * width
@@ -110,3 +121,5 @@ def _meet(
         if not apart <= 4.0 * radius[p] * radius[p]:
             for axis in range(3):
                 position[i, axis] = middle[p, axis]
+        for axis in range(3):
+            position[i, axis] = center[axis] + size * position[i, axis]

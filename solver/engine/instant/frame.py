@@ -10,22 +10,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
-from solver.engine.instant.image import Image, joined
+from solver.engine.instant.image import Image, joined, mean_gloss, mean_light
 from solver.engine.instant.nearby import HELPERS, PATHS_PER_RAY, nearby_light, shared_rays
 from solver.engine.instant.points import GlossyPoints, LitPoints, matched
-from solver.engine.instant.resolve import add_radiance, add_to_pixels
+from solver.engine.instant.resolve import (
+    CHUNK,
+    Glow,
+    add_irradiance,
+    add_luminance,
+    add_radiance,
+    add_shared,
+    add_to_pixels,
+    in_pieces,
+    take_in,
+)
 from solver.engine.instant.spread import Spread
 from solver.geometry.scene import Camera
 from solver.illumination.particles.compensation import Known, NearbyLight
 from solver.illumination.particles.receivers import Receivers
+from solver.parallel import run_chunks
 from solver.rendering.surface_points import SurfacePoints
-from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, Int64Array
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
 
 T = TypeVar("T", bound=np.generic)
 
@@ -35,7 +47,7 @@ PATHS_PER_LOBE: Final = 8
 _LOBE_HELPERS: Final = 1
 """Batches of lights that light up what rays by lobes meet, of which there are many."""
 
-_AT_ONCE: Final = 1 << 15
+_AT_ONCE: Final = 1 << 16
 """Rays to what is near between two yields."""
 
 
@@ -79,9 +91,9 @@ class InstantFrame:
         self._ring: list[Image | None] = [None] * RING
         self._rest: Image | None = None
         self._spread = Spread()
+        self._seen, self._seen_paths = np.zeros(camera.width * camera.height), 0
         self._turn = 0
         self._lobe_turn = 0
-        self._emitted: list[FloatArray] | None = None
         if before is not None:
             self._take_over(before)
         self._work = self._run()
@@ -122,68 +134,37 @@ class InstantFrame:
 
         It is that of the surfaces that pixels show themselves: of a mirror, what falls on the mirror.
         """
-        seen = zip(self._points, self._mean(self._images()), strict=True)
-        picture = self._black()
-        for points, light in seen:
-            shown = slice(0, points.shown)
-            add_to_pixels(points.pixel[shown], light.T[shown].astype(np.float64), picture)
-        return self._finished(picture)
+        picture, share = self._black(), 1.0 / len(self._points)
+        for points, light in zip(self._points, mean_light(self._images(), self._points), strict=True):
+            add = partial(add_irradiance, pixel=points.pixel, light=light, share=share, picture=picture)
+            run_chunks(add, points.shown, CHUNK)
+        return self._shaped(picture)
 
     def radiance(self) -> FloatArray:
         """(h, w, 3) W/(m2 sr)."""
-        world = self._blocks.world
-        surfaces, images = world.surfaces, self._images()
-        if self._emitted is None:
-            self._emitted = [points.emitted(world) for points in self._points]
-        reflected, picture = surfaces.reflectance / np.pi, self._black()
-        for points, glossy, emitted, light, gloss in zip(
-            self._points,
-            self._glossy,
-            self._emitted,
-            self._mean(images),
-            self._mean_gloss(images),
-            strict=True,
-        ):
-            add_radiance(points.pixel, points.patch, points.weight, emitted, reflected, light, picture)
+        surfaces, images = self._blocks.world.surfaces, self._images()
+        glow, picture, share = Glow.of(surfaces), self._black(), 1.0 / len(self._points)
+        lights, lobes = mean_light(images, self._points), mean_gloss(images, self._glossy)
+        for points, glossy, light, gloss in zip(self._points, self._glossy, lights, lobes, strict=True):
+            add = partial(
+                add_radiance, pixel=points.pixel, patch=points.patch, along=points.along,
+                weight=points.weight, glow=glow, light=light, share=share, picture=picture,
+            )  # fmt: skip
+            in_pieces(add, points.shown, len(points))
             row = glossy.row
-            lobed = points.weight[row] * surfaces.specular[points.patch[row]] * gloss.T / np.pi
-            add_to_pixels(points.pixel[row], lobed, picture)
-        return self._finished(picture)
+            if len(row) > 0:
+                lobed = points.weight[row] * surfaces.specular[points.patch[row]] * gloss.T
+                add_to_pixels(points.pixel[row], share / np.pi * lobed, picture)
+        return self._shaped(picture)
 
     def _black(self) -> FloatArray:
         return np.zeros((self.camera.width * self.camera.height, 3))
 
-    def _finished(self, picture: FloatArray) -> FloatArray:
-        return picture.reshape(self.camera.height, self.camera.width, 3) / len(self._points)
+    def _shaped(self, picture: FloatArray) -> FloatArray:
+        return picture.reshape(self.camera.height, self.camera.width, 3)
 
     def _images(self) -> list[Image]:
         return [image for image in (*self._ring, self._rest) if image is not None]
-
-    def _mean(self, images: list[Image]) -> list[Float32Array]:
-        """Irradiance (3, n) of each sample, of each image by its paths where it is valid."""
-        means = []
-        for sample, points in enumerate(self._points):
-            total = np.zeros((3, len(points)), dtype=np.float32)
-            weight = np.zeros(len(points), dtype=np.float32)
-            for image in images:
-                share = np.float32(image.paths) * image.valid[sample]
-                total += share * image.light[sample]
-                weight += share
-            means.append(np.asarray(total / np.maximum(weight, 1.0), dtype=np.float32))
-        return means
-
-    def _mean_gloss(self, images: list[Image]) -> list[Float32Array]:
-        """The same of the glossy points (3, g), by their lobes."""
-        means = []
-        for sample, glossy in enumerate(self._glossy):
-            total = glossy.dark()
-            weight = np.zeros(len(glossy), dtype=np.float32)
-            for image in images:
-                share = np.float32(image.paths) * image.valid[sample][glossy.row]
-                total += share * image.gloss[sample]
-                weight += share
-            means.append(np.asarray(total / np.maximum(weight, 1.0), dtype=np.float32))
-        return means
 
     # --- the work ------------------------------------------------------------------------------------
 
@@ -249,11 +230,12 @@ class InstantFrame:
                     found, along = near.sample(points.position[part], points.patch[part], stream, turn)
                     # What one finds is for all that stand beside it.
                     run = start[first : first + len(part) + 1]
-                    found = np.repeat(found, np.diff(run), axis=1) * np.float32(1.0 / rays)
-                    rows = np.arange(run[0], run[-1], dtype=np.int32)
-                    image.light[sample][:, run[0] : run[-1]] += found
-                    along = np.repeat(along, np.diff(run), axis=0)
-                    self._glossy[sample].add_sampled(image.gloss[sample], rows, found, along)
+                    add_shared(run, found, np.float32(1.0 / rays), image.light[sample])
+                    if len(self._glossy[sample].broad) > 0:
+                        rows = np.arange(run[0], run[-1], dtype=np.int32)
+                        found = np.repeat(found, np.diff(run), axis=1) * np.float32(1.0 / rays)
+                        along = np.repeat(along, np.diff(run), axis=0)
+                        self._glossy[sample].add_sampled(image.gloss[sample], rows, found, along)
                     yield
         self._turn += rays
 
@@ -278,28 +260,29 @@ class InstantFrame:
 
     def _judge(self, fresh: Image) -> None:
         """Learn from how a new image differs from those before."""
-        images = [image for image in self._images() if image.is_new]
-        if not images:
-            return
-        before = sum(image.paths for image in images)
-        known = self._reflected(self._mean(images), self._mean_gloss(images))
-        new = self._reflected(fresh.light, fresh.gloss)
-        mean = (before * known + fresh.paths * new) / (before + fresh.paths)
-        self._spread.learn(before, fresh.paths, float(np.mean((known - new) ** 2)), float(np.mean(mean**2)))
+        apart, power = take_in(self._seen, self._seen_paths, self._reflected(fresh), fresh.paths)
+        if self._seen_paths > 0:
+            self._spread.learn(self._seen_paths, fresh.paths, apart, power)
+        self._seen_paths += fresh.paths
 
-    def _reflected(self, light: list[Float32Array], gloss: list[Float32Array]) -> FloatArray:
+    def _reflected(self, image: Image) -> FloatArray:
         """Luminance (h w,) of what pixels reflect."""
         surfaces = self._blocks.world.surfaces
         matt, shiny = surfaces.reflectance * LUMINANCE_WEIGHTS, surfaces.specular * LUMINANCE_WEIGHTS
-        values = []
-        for points, glossy, part, lobes in zip(self._points, self._glossy, light, gloss, strict=True):
-            value = np.einsum("nc,cn->n", points.weight * matt[points.patch], part)
+        seen = np.zeros(self.camera.width * self.camera.height)
+        for points, glossy, light, lobes in zip(
+            self._points, self._glossy, image.light, image.gloss, strict=True
+        ):
+            add = partial(
+                add_luminance, pixel=points.pixel, patch=points.patch, weight=points.weight, matt=matt,
+                light=light, seen=seen,
+            )  # fmt: skip
+            in_pieces(add, points.shown, len(points))
             row = glossy.row
-            value[row] += np.einsum("nc,cn->n", points.weight[row] * shiny[points.patch[row]], lobes)
-            values.append(value)
-        pixel = np.concatenate([points.pixel for points in self._points])
-        seen = np.bincount(pixel, np.concatenate(values), self.camera.width * self.camera.height)
-        return np.asarray(seen, np.float64)
+            if len(row) > 0:
+                value = np.einsum("nc,cn->n", points.weight[row] * shiny[points.patch[row]], lobes)
+                np.add.at(seen, points.pixel[row], value)
+        return seen
 
     def _take_over(self, before: InstantFrame) -> None:
         """Let the mean of `before` stand in for all images that are not there yet."""
@@ -307,7 +290,7 @@ class InstantFrame:
         if not images:
             return
         light, gloss, valid = [], [], []
-        means, lobes = before._mean(images), before._mean_gloss(images)
+        means, lobes = mean_light(images, before._points), mean_gloss(images, before._glossy)
         pixels = self.camera.width * self.camera.height
         for sample, mine in enumerate(self._points):
             theirs, lobed = before._points[sample], self._glossy[sample].row

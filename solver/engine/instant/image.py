@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.engine.instant.points import GlossyPoints, LitPoints
+from solver.engine.instant.resolve import CHUNK, add_weighed, divide
+from solver.parallel import run_chunks
 from solver.types import BoolArray, Float32Array
 
 
@@ -45,3 +47,33 @@ def joined(a: Image, b: Image) -> Image:
         return [x + share * (y - x) for x, y in zip(of, and_of, strict=True)]
 
     return Image(mean(a.light, b.light), mean(a.gloss, b.gloss), a.valid, True, paths)
+
+
+def mean_light(images: list[Image], points: list[LitPoints]) -> list[Float32Array]:
+    """Irradiance (3, n) of each sample, of each image by its paths where it is valid."""
+    means = []
+    for sample, of in enumerate(points):
+        parts = [(image.light[sample], image.valid[sample], image.paths) for image in images]
+        means.append(_mean(parts, len(of)))
+    return means
+
+
+def mean_gloss(images: list[Image], glossy: list[GlossyPoints]) -> list[Float32Array]:
+    """The same of the glossy points (3, g), by their lobes."""
+    means = []
+    for sample, of in enumerate(glossy):
+        parts = [(image.gloss[sample], image.valid[sample][of.row], image.paths) for image in images]
+        means.append(_mean(parts, len(of)))
+    return means
+
+
+def _mean(parts: list[tuple[Float32Array, BoolArray, int]], count: int) -> Float32Array:
+    total, weight = np.zeros((3, count), dtype=np.float32), np.zeros(count, dtype=np.float32)
+
+    def add(start: int, stop: int) -> None:
+        for light, valid, paths in parts:
+            add_weighed(start, stop, light, valid, np.float32(paths), total, weight)
+        divide(start, stop, total, weight)
+
+    run_chunks(add, count, CHUNK)
+    return total

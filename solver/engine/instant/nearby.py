@@ -11,6 +11,7 @@ from solver.illumination.particles.compensation import Known, NearbyLight
 from solver.illumination.particles.glossy import GlossyLight
 from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.receivers import Receivers
+from solver.kernels import kernel
 from solver.types import Float32Array, Int64Array, IntArray
 
 PATHS_PER_RAY: Final = 32
@@ -58,8 +59,20 @@ def shared_rays(patch: IntArray, every: int, turn: int) -> tuple[Int64Array, Int
     Neighbours in a list of points are near each other. Without runs one in `every` points would be that many
     times as bright, and the others too dark, until all have had their turn.
     """
-    n = len(patch)
-    begins = np.ones(n, dtype=np.bool_)
-    begins[1:] = (patch[1:] != patch[:-1]) | (np.arange(1, n) % every == 0)
-    start = np.append(np.flatnonzero(begins), n)
-    return start, (start[:-1] + turn % np.diff(start)).astype(np.int32)
+    start, asked = np.empty(len(patch) + 1, dtype=np.int64), np.empty(len(patch), dtype=np.int32)
+    runs = _run(patch, every, turn, start, asked)
+    return start[: runs + 1], asked[:runs]
+
+
+@kernel
+def _run(patch: IntArray, every: int, turn: int, start: Int64Array, asked: IntArray) -> int:
+    """Number of runs, where they begin, and who of them is asked."""
+    runs, n = 0, len(patch)
+    start[0] = 0
+    for i in range(1, n + 1):
+        if i == n or i % every == 0 or patch[i] != patch[i - 1]:
+            first = start[runs]
+            asked[runs] = first + turn % (i - first)
+            runs += 1
+            start[runs] = i
+    return runs

@@ -11,14 +11,17 @@ from typing import Final
 
 import numpy as np
 
+from solver.engine.instant.resolve import CHUNK
 from solver.engine.world import World
 from solver.geometry.scene import Camera
 from solver.illumination.particles.glossy import gloss_of, is_broad, lobe_axis, lobe_factor
 from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.mirror_ways import follow, is_glossy, is_mirror, mirrored
 from solver.illumination.particles.receivers import Polygons, Receivers
+from solver.kernels import kernel
+from solver.parallel import run_chunks
 from solver.rendering.surface_points import SurfacePoints
-from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points, Vector
 
 _SAME: Final = 1e-9
 """Points nearer than this times the scene's size are the same."""
@@ -47,10 +50,11 @@ class LitPoints:
     def of(cls, points: SurfacePoints, camera: Camera, world: World) -> LitPoints:
         """Where the rays of `camera` to `points` end."""
         surfaces, n = world.surfaces, len(points)
-        along = points.position - camera.eye
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        weight = np.ones((n, 3))
-        seen = np.flatnonzero(is_mirror(surfaces, points.patch))
+        along, weight = np.empty((n, 3)), np.ones((n, 3))
+        run_chunks(lambda start, stop: _look(start, stop, points.position, camera.eye, along), n, CHUNK)
+        patches: IntArray = np.arange(surfaces.patch_count, dtype=np.int32)
+        mirrors = is_mirror(surfaces, patches)
+        seen = np.flatnonzero(mirrors[points.patch]) if mirrors.any() else patches[:0]
         if len(seen) == 0:
             depth = np.zeros(n, dtype=np.int32)
             return cls(points.pixel, depth, points.patch, points.position, along, weight, n)
@@ -77,17 +81,6 @@ class LitPoints:
         """Numbers (n,) by which points are known, of a frame of so many pixels."""
         return np.asarray(self.depth.astype(np.int64) * pixels + self.pixel)
 
-    def emitted(self, world: World) -> FloatArray:
-        """Radiance (n, 3) W/(m2 sr) that points emit towards the eye."""
-        surfaces = world.surfaces
-        exponent = surfaces.emission_exponent[self.patch]
-        radiance = surfaces.emission[self.patch] / np.pi
-        if exponent.any():
-            falling = np.einsum("na,na->n", self.along, surfaces.normal[self.patch])
-            cosine = np.maximum(-falling, 0.0)
-            radiance = radiance * (0.5 * (exponent + 2.0) * cosine**exponent)[:, None]
-        return np.asarray(radiance)
-
 
 def matched(
     points: LitPoints, before: LitPoints, world: World, world_before: World, pixels: int
@@ -105,6 +98,19 @@ def matched(
     # By mirrors an eye may see the same point from elsewhere.
     same &= (points.depth == 0) | (np.abs(points.along - before.along[source]).max(axis=1) <= _SAME)
     return source, same
+
+
+@kernel
+def _look(start: int, stop: int, position: Points, eye: Vector, along: FloatArray) -> None:
+    """Unit directions (n, 3) from an eye to the points [start, stop)."""
+    for i in range(start, stop):
+        square = 0.0
+        for axis in range(3):
+            along[i, axis] = position[i, axis] - eye[axis]
+            square += along[i, axis] ** 2
+        scale = 1.0 / np.sqrt(square)
+        for axis in range(3):
+            along[i, axis] *= scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +134,9 @@ class GlossyPoints:
     def of(cls, points: LitPoints, world: World, polygons: Polygons) -> GlossyPoints:
         """The glossy ones of `points`."""
         surfaces = world.surfaces
-        row = np.flatnonzero(is_glossy(surfaces, points.patch))
+        patches: IntArray = np.arange(surfaces.patch_count, dtype=np.int32)
+        glossy = is_glossy(surfaces, patches)
+        row = np.flatnonzero(glossy[points.patch]) if glossy.any() else np.empty(0, dtype=np.int64)
         patch = points.patch[row]
         axis = lobe_axis(surfaces, patch, points.along[row])
         is_wide = is_broad(surfaces, patch)

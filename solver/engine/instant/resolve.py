@@ -1,9 +1,53 @@
-"""From points back to pixels."""
+"""From points back to pixels: kernels of what a picture is made of.
+
+Points that pixels show themselves have a pixel each, so that pieces of them may be added at the same time;
+those by mirrors may not.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
 from solver.kernels import kernel
-from solver.types import Float32Array, FloatArray, IntArray
+from solver.parallel import run_chunks
+from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray
+
+CHUNK: Final = 1 << 14
+"""Points of a piece of work"""
+
+
+class Glow(NamedTuple):
+    """What patches (p,) make of irradiance, and what they emit."""
+
+    normal: FloatArray
+    """(p, 3)"""
+    emitted: FloatArray
+    """(p, 3) W/(m2 sr), of a diffuse emitter"""
+    exponent: FloatArray
+    """(p,) of emission"""
+    reflected: FloatArray
+    """(p, 3) radiance for each W/m2"""
+
+    @classmethod
+    def of(cls, surfaces: Surfaces) -> Glow:
+        """That of `surfaces`."""
+        return cls(
+            surfaces.normal,
+            surfaces.emission / np.pi,
+            surfaces.emission_exponent,
+            surfaces.reflectance / np.pi,
+        )
+
+
+def in_pieces(add: Callable[[int, int], object], shown: int, count: int) -> None:
+    """Call `add(start, stop)` over all points, of which the first `shown` are those that pixels show."""
+    run_chunks(add, shown, CHUNK)
+    if count > shown:
+        add(shown, count)
 
 
 @kernel
@@ -15,16 +59,109 @@ def add_to_pixels(pixel: IntArray, values: FloatArray, picture: FloatArray) -> N
 
 
 @kernel
+def add_irradiance(
+    start: int, stop: int, pixel: IntArray, light: Float32Array, share: float, picture: FloatArray
+) -> None:
+    """Add `share` of light (3, n) of the points [start, stop) to their pixels (n,) of picture (k, 3)."""
+    for i in range(start, stop):
+        for c in range(3):
+            picture[pixel[i], c] += share * light[c, i]
+
+
+@kernel
 def add_radiance(
+    start: int,
+    stop: int,
+    pixel: IntArray,
+    patch: IntArray,
+    along: FloatArray,
+    weight: FloatArray,
+    glow: Glow,
+    light: Float32Array,
+    share: float,
+    picture: FloatArray,
+) -> None:
+    """Add `share` times weight (n, 3) of what points emit, and reflect of light (3, n), to their pixels."""
+    for i in range(start, stop):
+        p = patch[i]
+        lobe = 1.0
+        exponent = glow.exponent[p]
+        if exponent != 0.0:
+            cosine = 0.0
+            for axis in range(3):
+                cosine -= along[i, axis] * glow.normal[p, axis]
+            lobe = 0.5 * (exponent + 2.0) * max(cosine, 0.0) ** exponent
+        for c in range(3):
+            radiance = lobe * glow.emitted[p, c] + glow.reflected[p, c] * light[c, i]
+            picture[pixel[i], c] += share * weight[i, c] * radiance
+
+
+@kernel
+def add_luminance(
+    start: int,
+    stop: int,
     pixel: IntArray,
     patch: IntArray,
     weight: FloatArray,
-    emitted: FloatArray,
-    reflected: FloatArray,
+    matt: FloatArray,
     light: Float32Array,
-    picture: FloatArray,
+    seen: FloatArray,
 ) -> None:
-    """Add weight (n, 3) times radiance to pixels (n,): emitted (n, 3), reflected (p, 3) of light (3, n)."""
-    for i in range(len(pixel)):
+    """Add to pixels `seen` (k,) the luminance that points reflect by matt (p, 3) of light (3, n)."""
+    for i in range(start, stop):
+        value = 0.0
         for c in range(3):
-            picture[pixel[i], c] += weight[i, c] * (emitted[i, c] + reflected[patch[i], c] * light[c, i])
+            value += weight[i, c] * matt[patch[i], c] * light[c, i]
+        seen[pixel[i]] += value
+
+
+@kernel
+def add_weighed(
+    start: int,
+    stop: int,
+    light: Float32Array,
+    valid: BoolArray,
+    paths: np.float32,
+    total: Float32Array,
+    weight: Float32Array,
+) -> None:
+    """Add light (3, n) `paths` times to `total` where it is valid (n,), and `paths` to weight (n,)."""
+    for c in range(3):
+        for i in range(start, stop):
+            total[c, i] += (paths if valid[i] else np.float32(0.0)) * light[c, i]
+    for i in range(start, stop):
+        weight[i] += paths if valid[i] else np.float32(0.0)
+
+
+@kernel
+def divide(start: int, stop: int, total: Float32Array, weight: Float32Array) -> None:
+    """Make means of sums (3, n) of weights (n,), which are whole numbers; 0 where there is none."""
+    for c in range(3):
+        for i in range(start, stop):
+            total[c, i] /= max(weight[i], np.float32(1.0))
+
+
+@kernel
+def take_in(mean: FloatArray, before: int, fresh: FloatArray, paths: int) -> tuple[float, float]:
+    """Take an image (k,) of so many paths into the mean (k,) of those `before`.
+
+    Returns the mean square of their difference, and that of the new mean.
+    """
+    apart = power = 0.0
+    share = paths / (before + paths)
+    for i in range(len(mean)):
+        difference = fresh[i] - mean[i]
+        mean[i] += share * difference
+        apart += difference * difference
+        power += mean[i] * mean[i]
+    return apart / len(mean), power / len(mean)
+
+
+@kernel
+def add_shared(run: Int64Array, found: Float32Array, share: np.float32, light: Float32Array) -> None:
+    """Add `share` of found (3, k) to the columns run[k] to run[k + 1] of light (3, n)."""
+    for c in range(3):
+        for k in range(found.shape[1]):
+            value = share * found[c, k]
+            for i in range(run[k], run[k + 1]):
+                light[c, i] += value

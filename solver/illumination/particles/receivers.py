@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.types import Float32Array, IntArray, Points
+from solver.kernels import kernel
+from solver.parallel import run_chunks
+from solver.types import Float32Array, FloatArray, IntArray, Points, Vector
+
+_CHUNK: Final = 1 << 14
+"""Receivers of a piece of work"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +66,16 @@ class Receivers:
         """Receivers at world `positions` (n, 3) on the lit side of `patch` (n,)."""
         surfaces = polygons.surfaces
         frame = np.empty((6, len(patch)), dtype=np.float32)
-        frame[:3] = local(surfaces, positions).T
-        frame[3:] = surfaces.normal[patch].T
-        return cls(frame, polygons.of_patch[patch], patch)
+        polygon = np.empty(len(patch), dtype=np.int32)
+        run_chunks(
+            lambda start, stop: _place(
+                start, stop, positions, patch, surfaces.normal, surfaces.center, surfaces.size,
+                polygons.of_patch, frame, polygon,
+            ),
+            len(patch),
+            _CHUNK,
+        )  # fmt: skip
+        return cls(frame, polygon, patch)
 
     def __len__(self) -> int:
         return len(self.patch)
@@ -77,3 +90,25 @@ class Receivers:
 def local(surfaces: Surfaces, points: Points) -> Points:
     """World points (..., 3) in local coordinates, as rays have them."""
     return np.asarray((points - surfaces.center) / surfaces.size)
+
+
+@kernel
+def _place(
+    start: int,
+    stop: int,
+    positions: Points,
+    patch: IntArray,
+    normal: FloatArray,
+    center: Vector,
+    size: float,
+    of_patch: IntArray,
+    frame: Float32Array,
+    polygon: IntArray,
+) -> None:
+    """The frames (6, n) and polygons (n,) of the receivers [start, stop)."""
+    for i in range(start, stop):
+        p = patch[i]
+        polygon[i] = of_patch[p]
+        for axis in range(3):
+            frame[axis, i] = (positions[i, axis] - center[axis]) / size
+            frame[3 + axis, i] = normal[p, axis]

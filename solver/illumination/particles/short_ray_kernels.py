@@ -185,3 +185,20 @@ def arrive(
         found.emitted[k] = emitted
         count += 1
     return count
+
+
+@kernel
+def by_patch(begin: Int64Array, end: Int64Array, patch: IntArray, patches: int) -> Int64Array:
+    """The indices of all pieces [begin, end) (m,), ordered by patch, those of one patch as they are."""
+    place = np.zeros(patches + 1, dtype=np.int64)
+    for piece in range(len(begin)):
+        for i in range(begin[piece], end[piece]):
+            place[patch[i] + 1] += 1
+    for p in range(patches):
+        place[p + 1] += place[p]
+    order = np.empty(place[patches], dtype=np.int64)
+    for piece in range(len(begin)):
+        for i in range(begin[piece], end[piece]):
+            order[place[patch[i]]] = i
+            place[patch[i]] += 1
+    return order

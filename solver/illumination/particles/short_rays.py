@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.mirror_ways import Ends, follow
-from solver.illumination.particles.short_ray_kernels import Found, Patches, aim, arrive, draw
+from solver.illumination.particles.short_ray_kernels import Found, Patches, aim, arrive, by_patch, draw
 from solver.parallel import run_chunks
 from solver.types import FloatArray, Int64Array, IntArray, Points
 from solver.visibility.rays import RayScene
@@ -29,7 +29,7 @@ class Met:
     directions: FloatArray
     """(n, 3) unit, of all rays"""
     ends: Ends
-    """The k of them that come upon anything"""
+    """The k of them that come upon anything, patch by patch where there are no mirrors"""
     share: FloatArray
     """(k,) part of what is reflected there that a bound takes away"""
     emitted: FloatArray
@@ -84,9 +84,11 @@ class ShortRays:
             )  # fmt: skip
 
         run_chunks(trace, n, _CHUNK, _LEAST)
-        pieces = [slice(start, start + counts[start]) for start in sorted(counts)]
-        one = found if n == 0 else Found(*(np.concatenate([of[piece] for piece in pieces]) for of in found))
-        k = len(one.row) if n > 0 else 0
+        begin = np.array(sorted(counts), dtype=np.int64)
+        end = np.array([start + counts[start] for start in begin.tolist()], dtype=np.int64)
+        # Ends on one patch are lit together, which takes a third of the time.
+        order = by_patch(begin, end, found.patch, s.patch_count)
+        one, k = Found(*(of[order] for of in found)), len(order)
         weight, depth = np.broadcast_to(1.0, (k, 3)), np.broadcast_to(np.int32(0), k)
         ends = Ends(one.row, one.position, one.patch, one.along, one.distance, weight, depth)
         return Met(directions, ends, one.share, one.emitted)

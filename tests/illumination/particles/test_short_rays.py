@@ -31,7 +31,9 @@ def sent(of: Room, bound: float, has_mirrors: bool, least: float, count: int = 5
     positions, patch = spread(of, count)
     stream: Int64Array = np.arange(count, dtype=np.int64)
     short = ShortRays(of.surfaces, of.rays, bound, has_mirrors)
-    return short.send(positions, patch, stream, 3, 0, np.full(of.surfaces.patch_count, least))
+    met = short.send(positions, patch, stream, 3, 0, np.full(of.surfaces.patch_count, least))
+    order = np.argsort(met.ends.row)
+    return Met(met.directions, met.ends.take(order), met.share[order], met.emitted[order])
 
 
 @pytest.mark.parametrize(("bound", "least"), [(1.0, 0.0), (25.0, 0.0), (25.0, 60.0), (400.0, 500.0)])
@@ -65,6 +67,17 @@ def test_nothing_is_asked_of_no_points() -> None:
     met = sent(crowded(), 10.0, False, 0.0, count=0)
     assert met.directions.shape == (0, 3)
     assert len(met.ends.row) == len(met.share) == len(met.emitted) == 0
+
+
+def test_ends_come_patch_by_patch() -> None:
+    of = crowded()
+    positions, patch = spread(of, 30000)
+    stream: Int64Array = np.arange(len(patch), dtype=np.int64)
+    short = ShortRays(of.surfaces, of.rays, 5.0, has_mirrors=False)
+    ends = short.send(positions, patch, stream, 0, 0, np.zeros(of.surfaces.patch_count)).ends
+    assert len(ends.row) > 1000
+    assert np.all(np.diff(ends.patch) >= 0)
+    assert np.all(np.diff(ends.row)[np.diff(ends.patch) == 0] > 0), "those of one in the order of their rays"
 
 
 def directions(patch: IntArray, turns: int, bounce: int, stream: int) -> FloatArray:
