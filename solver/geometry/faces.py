@@ -30,6 +30,24 @@ class FacePatches:
     """Indices of faces without area."""
     unfaithful: tuple[int, ...]
     """Indices of faces whose triangulation does not have the face's area: they cross themselves."""
+    smallest: float
+    """m, the least diameter of a face that is kept; infinite for none"""
+    largest_speck: float
+    """m, the greatest diameter of a face that is dropped for its size alone; negative for none"""
+
+    def holds_in(self, scene_size: float) -> bool:
+        """Whether these are the patches in a scene with a diameter of `scene_size` metres too."""
+        least = tolerances.DEGENERATE_LENGTH * scene_size
+        return self.largest_speck <= least < self.smallest
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products (..., 3), as `np.cross`, which takes several times as long over a few vectors."""
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.subtract(a[..., i] * b[..., j], a[..., j] * b[..., i], out=product[..., k])
+    return product
 
 
 def newell_normal(polygons: FloatArray) -> FloatArray:
@@ -39,8 +57,12 @@ def newell_normal(polygons: FloatArray) -> FloatArray:
     digits.
     """
     local = polygons - polygons[:, :1]
-    following = np.roll(local, -1, axis=1)
-    return np.asarray(np.cross(local, following).sum(axis=1))
+    return np.asarray(cross(local, _following(local)).sum(axis=1))
+
+
+def _following(polygons: FloatArray) -> FloatArray:
+    """(k, n, ...) with what follows each corner in its place."""
+    return np.concatenate([polygons[:, 1:], polygons[:, :1]], axis=1)
 
 
 def split_faces(vertices: Points, faces: tuple[tuple[int, ...], ...], scene_size: float) -> FacePatches:
@@ -48,23 +70,35 @@ def split_faces(vertices: Points, faces: tuple[tuple[int, ...], ...], scene_size
     pieces: list[tuple[Corners, IntArray, IntArray]] = []
     dropped: list[int] = []
     unfaithful: list[int] = []
+    smallest, largest_speck = np.inf, -1.0
     by_count: dict[int, list[int]] = {}
     for index, face in enumerate(faces):
         by_count.setdefault(len(face), []).append(index)
     for count, members in sorted(by_count.items()):
         ids = np.array(members, dtype=np.int32)
         polygons = vertices[np.array([faces[i] for i in members], dtype=np.int64)]
-        alive = _has_area(polygons, scene_size)
-        dropped.extend(int(i) for i in ids[~alive])
-        polygons, ids = polygons[alive], ids[alive]
+        doubled, diameter = newell_normal(polygons), _diameter(polygons)
+        length = np.linalg.norm(doubled, axis=-1)
+        has_area = 0.5 * length > tolerances.DEGENERATE_AREA * diameter**2
+        is_speck = diameter <= tolerances.DEGENERATE_LENGTH * scene_size
+        alive = has_area & ~is_speck
+        smallest = float(diameter.min(initial=smallest, where=alive))
+        largest_speck = float(diameter.max(initial=largest_speck, where=has_area & is_speck))
+        if not alive.all():
+            dropped.extend(ids[~alive].tolist())
+            polygons, ids = polygons[alive], ids[alive]
+            doubled, length, diameter = doubled[alive], length[alive], diameter[alive]
         if count == 3:
             pieces.append(_triangles(polygons, ids))
             continue
         simple = np.zeros(len(ids), dtype=bool)
         if count == 4:
-            simple = _is_planar(polygons) & _is_convex(polygons)
+            normal = doubled / length[:, None]
+            simple = _is_planar(polygons, normal, diameter) & _is_convex(polygons, normal, diameter)
             quads = polygons[simple]
             pieces.append((quads, np.full(len(quads), 4, dtype=np.int32), ids[simple]))
+            if simple.all():
+                continue
         for polygon, index in zip(polygons[~simple], ids[~simple], strict=True):
             triangles, faithful = _triangulate(polygon)
             pieces.append(_triangles(triangles, np.full(len(triangles), index, dtype=np.int32)))
@@ -75,7 +109,13 @@ def split_faces(vertices: Points, faces: tuple[tuple[int, ...], ...], scene_size
     face_of = np.concatenate([piece[2] for piece in pieces] or [np.empty(0, dtype=np.int32)])
     order = np.argsort(face_of, kind="stable")
     return FacePatches(
-        corners[order], count_of[order], face_of[order], tuple(sorted(dropped)), tuple(sorted(unfaithful))
+        corners=corners[order],
+        corner_count=count_of[order],
+        face=face_of[order],
+        dropped=tuple(sorted(dropped)),
+        unfaithful=tuple(sorted(unfaithful)),
+        smallest=smallest,
+        largest_speck=largest_speck,
     )
 
 
@@ -88,31 +128,18 @@ def _diameter(polygons: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(extent, axis=-1))
 
 
-def _has_area(polygons: FloatArray, scene_size: float) -> BoolArray:
-    diameter = _diameter(polygons)
-    area = 0.5 * np.linalg.norm(newell_normal(polygons), axis=-1)
-    return np.asarray(
-        (area > tolerances.DEGENERATE_AREA * diameter**2)
-        & (diameter > tolerances.DEGENERATE_LENGTH * scene_size)
-    )
-
-
-def _is_planar(polygons: FloatArray) -> BoolArray:
-    normal = newell_normal(polygons)
-    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+def _is_planar(polygons: FloatArray, normal: FloatArray, diameter: FloatArray) -> BoolArray:
     local = polygons - polygons.mean(axis=1, keepdims=True)
     height = np.abs(np.einsum("kni,ki->kn", local, normal)).max(axis=1)
-    return np.asarray(height <= tolerances.PLANARITY * _diameter(polygons))
+    return np.asarray(height <= tolerances.PLANARITY * diameter)
 
 
-def _is_convex(polygons: FloatArray) -> BoolArray:
+def _is_convex(polygons: FloatArray, normal: FloatArray, diameter: FloatArray) -> BoolArray:
     """Whether every corner turns left by more than rounding, seen along the polygon's normal."""
-    normal = newell_normal(polygons)
-    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    edge = np.roll(polygons, -1, axis=1) - polygons
-    turn = np.cross(np.roll(edge, 1, axis=1), edge)
+    edge = _following(polygons) - polygons
+    turn = cross(edge, _following(edge))
     signed = np.einsum("kni,ki->kn", turn, normal)
-    return np.asarray((signed > tolerances.DEGENERATE_AREA * _diameter(polygons)[:, None] ** 2).all(axis=1))
+    return np.asarray((signed > tolerances.DEGENERATE_AREA * diameter[:, None] ** 2).all(axis=1))
 
 
 def _triangulate(polygon: Points) -> tuple[FloatArray, bool]:
@@ -121,9 +148,9 @@ def _triangulate(polygon: Points) -> tuple[FloatArray, bool]:
     length = float(np.linalg.norm(normal))
     normal = normal / length
     helper = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(helper, normal)
+    u = cross(helper, normal)
     u /= np.linalg.norm(u)
-    v = np.cross(normal, u)
+    v = cross(normal, u)
     local = polygon - polygon[0]
     flat = np.stack([local @ u, local @ v], axis=-1)
     indices = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32))

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.geometry.faces import split_faces
+from solver.geometry.parts import extent, part_of
 from solver.geometry.scene import Scene, SceneObject
-from solver.types import Corners, FloatArray, Int64Array, IntArray, ObjectId, Vector
+from solver.types import Corners, FloatArray, IntArray, ObjectId, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,147 +81,53 @@ class Surfaces:
 
 
 def flatten(scene: Scene) -> Surfaces:
-    """The surfaces of `scene`; degenerate faces are dropped with a warning."""
+    """The surfaces of `scene`; degenerate faces are dropped with a warning.
+
+    Of objects that were in an earlier scene too, what they gave to that is taken over.
+    """
     objects = list(scene)
     center, size = _bounds(objects)
-    parts = [_flatten_object(o, index, size) for index, o in enumerate(objects)]
-    warnings = [warning for part in parts for warning in part.warnings]
-    start = np.cumsum([0] + [len(part.area) for part in parts])
+    parts = [part_of(o, size) for o in objects]
+    counts = np.array([len(part.area) for part in parts], dtype=np.int64)
+    # Triangles name patches of their own object, or none.
+    first = np.repeat(np.cumsum(counts) - counts, [len(part.triangles) for part in parts])[:, None]
+    local = _join_ids([part.triangle_patch for part in parts], (0, 2))
     return Surfaces(
         object_ids=tuple(o.id for o in objects),
         corners=_join([part.corners for part in parts], (0, 4, 3)),
-        corner_count=_join_ids([part.corner_count for part in parts]),
+        corner_count=_join_ids([part.corner_count for part in parts], (0,)),
         normal=_join([part.normal for part in parts], (0, 3)),
         area=_join([part.area for part in parts], (0,)),
-        face=_join_ids([part.face for part in parts]),
-        object=_join_ids([part.object for part in parts]),
-        side=_join_ids([part.side for part in parts]),
+        face=_join_ids([part.face for part in parts], (0,)),
+        object=np.repeat(np.arange(len(parts), dtype=np.int32), counts),
+        side=_join_ids([part.side for part in parts], (0,)),
         reflectance=_join([part.reflectance for part in parts], (0, 3)),
         emission=_join([part.emission for part in parts], (0, 3)),
         specular=_join([part.specular for part in parts], (0, 3)),
         exponent=_join([part.exponent for part in parts], (0,)),
         emission_exponent=_join([part.emission_exponent for part in parts], (0,)),
         triangles=_join([part.triangles for part in parts], (0, 3, 3)),
-        triangle_patch=np.concatenate(
-            [
-                np.where(part.triangle_patch >= 0, part.triangle_patch + np.int32(first), np.int32(-1))
-                for part, first in zip(parts, start[:-1], strict=True)
-            ]
-            or [np.empty((0, 2), dtype=np.int32)]
-        ).astype(np.int32),
+        triangle_patch=np.where(local >= 0, local + first, -1).astype(np.int32),
         center=center,
         size=size,
         face_count=sum(part.face_count for part in parts),
-        warnings=tuple(warnings),
+        warnings=tuple(warning for part in parts for warning in part.warnings),
     )
 
 
 def _bounds(objects: Sequence[SceneObject]) -> tuple[Vector, float]:
-    used = [
-        o.world_vertices[sorted({i for face in o.mesh.faces for i in face})] for o in objects if o.mesh.faces
-    ]
-    if not used:
+    extents = [found for o in objects if (found := extent(o)) is not None]
+    if not extents:
         return np.zeros(3), 1.0
-    low = np.min([v.min(axis=0) for v in used], axis=0)
-    high = np.max([v.max(axis=0) for v in used], axis=0)
+    low = np.min([least for least, _ in extents], axis=0)
+    high = np.max([greatest for _, greatest in extents], axis=0)
     size = float(np.linalg.norm(high - low))
     return 0.5 * (low + high), size if size > 0.0 else 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    corners: Corners
-    corner_count: IntArray
-    normal: FloatArray
-    area: FloatArray
-    face: IntArray
-    object: IntArray
-    side: IntArray
-    reflectance: FloatArray
-    emission: FloatArray
-    specular: FloatArray
-    exponent: FloatArray
-    emission_exponent: FloatArray
-    triangles: FloatArray
-    triangle_patch: IntArray
-    face_count: int
-    warnings: tuple[str, ...]
-
-
-def _flatten_object(source: SceneObject, index: int, scene_size: float) -> _Part:
-    faces = source.mesh.faces
-    if source.transform.mirrors:
-        faces = tuple(face[::-1] for face in faces)
-    split = split_faces(source.world_vertices, faces, scene_size)
-    corners, count = split.corners, split.corner_count
-    p = len(count)
-    doubled = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    is_triangle = count == 3
-    doubled[is_triangle] = np.cross(
-        corners[is_triangle, 1] - corners[is_triangle, 0], corners[is_triangle, 2] - corners[is_triangle, 0]
-    )
-    length = np.linalg.norm(doubled, axis=-1)
-    normal, area = doubled / length[:, None], 0.5 * length
-    triangles, owner = _opaque_triangles(corners, count)
-    back = np.full(len(owner), -1, dtype=np.int32)
-    face, side = split.face, np.zeros(p, dtype=np.int32)
-    if source.material.two_sided:
-        reverse = np.where(is_triangle[:, None], [[2, 1, 0, 0]], [[3, 2, 1, 0]])
-        corners = np.concatenate([corners, np.take_along_axis(corners, reverse[:, :, None], axis=1)])
-        count, area = np.concatenate([count, count]), np.concatenate([area, area])
-        normal, face = np.concatenate([normal, -normal]), np.concatenate([face, face])
-        side = np.repeat(np.array([0, 1], dtype=np.int32), p)
-        back = owner + np.int32(p)
-    total = len(count)
-    return _Part(
-        corners=corners,
-        corner_count=count,
-        normal=normal,
-        area=area,
-        face=face,
-        object=np.full(total, index, dtype=np.int32),
-        side=side,
-        reflectance=np.tile(source.material.reflectance, (total, 1)),
-        emission=np.tile(source.material.emission, (total, 1)),
-        specular=np.tile(source.material.specular, (total, 1)),
-        exponent=np.full(total, source.material.exponent, dtype=np.float64),
-        emission_exponent=np.full(total, source.material.emission_exponent, dtype=np.float64),
-        triangles=triangles,
-        triangle_patch=np.stack([owner, back], axis=-1),
-        face_count=len(faces) - len(split.dropped),
-        warnings=_warnings(source.id, split.dropped, split.unfaithful),
-    )
-
-
-def _opaque_triangles(corners: Corners, count: IntArray) -> tuple[FloatArray, IntArray]:
-    """Triangles (t, 3, 3) of the patches, and the patch of each; a quadrilateral gives two."""
-    first: Int64Array = np.arange(len(count))
-    second = np.flatnonzero(count == 4)
-    triangles = np.concatenate([corners[:, :3], corners[second][:, [0, 2, 3]]])
-    return triangles, np.concatenate([first, second]).astype(np.int32)
-
-
-def _warnings(object_id: ObjectId, dropped: Sequence[int], unfaithful: Sequence[int]) -> tuple[str, ...]:
-    told = []
-    if dropped:
-        told.append(
-            f"object {object_id!r}: {_count(len(dropped))} of zero area dropped (first: {dropped[0]})"
-        )
-    if unfaithful:
-        told.append(
-            f"object {object_id!r}: {_count(len(unfaithful))} crossing itself, triangulated approximately "
-            f"(first: {unfaithful[0]})"
-        )
-    return tuple(told)
-
-
-def _count(n: int) -> str:
-    return f"{n} face" if n == 1 else f"{n} faces"
 
 
 def _join(parts: list[FloatArray], empty: tuple[int, ...]) -> FloatArray:
     return np.concatenate(parts) if parts else np.empty(empty)
 
 
-def _join_ids(parts: list[IntArray]) -> IntArray:
-    return np.concatenate(parts).astype(np.int32) if parts else np.empty(0, dtype=np.int32)
+def _join_ids(parts: list[IntArray], empty: tuple[int, ...]) -> IntArray:
+    return np.concatenate(parts) if parts else np.empty(empty, dtype=np.int32)
