@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver.engine.world import World
+from solver.illumination.particles.clearance import clear_of_walls
 from solver.illumination.particles.compensation import emission_bounds
 from solver.illumination.particles.images import FoldedLights, ShiningImages, look_through
 from solver.illumination.particles.light_lobes import Gloss
@@ -100,7 +101,7 @@ class LightBlocks:
             walked = self._walk.block(PATHS * first_path(number), PATHS * paths)
             lights = thinned(walked, surfaces, paths, self._seed)
             order = np.random.default_rng((self._seed, number)).permutation(len(lights)).astype(np.int32)
-            lights = lights.take(order)
+            lights = clear_of_walls(lights.take(order), surfaces)
             least = emission_bounds(surfaces, paths)
             shining = ShiningLights.all_of(self.polygons, lights, least)
             images = mirror_images(lights, surfaces, len(lights), number)
