@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.lights import VirtualLights
 from solver.kernels import kernel
@@ -91,7 +89,7 @@ def _move(
 @kernel
 def _is_near(point: FloatArray, low: FloatArray, high: FloatArray, apart: float) -> bool:
     """Whether a point is within a box, or not as far as `apart` from it."""
+    is_near = True
     for axis in range(3):
-        if point[axis] < low[axis] - apart or point[axis] > high[axis] + apart:
-            return False
-    return True
+        is_near = is_near and low[axis] - apart <= point[axis] <= high[axis] + apart
+    return is_near

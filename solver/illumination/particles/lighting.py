@@ -129,11 +129,13 @@ def add_light(
     `folds` only the images among the lights shine. With `gloss` light counts by (n + 2) / 2 cos^n of the
     angle to the lobe's axis: over pi, and times rho_s, it is the radiance that lobes reflect to their eyes.
     """
+    # What an image sees does not tell all of its light's way.
+    alike = sights.alike if folds is None else sights.texels
     run_chunks(
         lambda start, stop: _light(
             start, stop, receivers.frame, receivers.polygon, lights.frames, lights.power, lights.lobe,
-            lights.least_bound, sights.texels, sights.start, sights.polygon, sights.cone, np.float32(bound),
-            irradiance, folds, gloss,
+            lights.least_bound, sights.texels, alike, sights.start, sights.polygon, sights.cone,
+            np.float32(bound), irradiance, folds, gloss,
         ),
         len(receivers),
         _CHUNK,
@@ -151,6 +153,7 @@ def _light(
     lobe: Float32Array,
     least_bound: Float32Array,
     texels: Texels,
+    alike: Texels,
     sight_start: IntArray,
     seen: IntArray,
     cone: Float32Array,
@@ -198,16 +201,12 @@ def _light(
             if gloss is not None:
                 polish(x, y, z, lights, k, gloss, first, gain)
             # Who does not see the light for certain, and then whether they do.
-            sight = texels[k].reshape(size * size)
+            sight, same = texels[k].reshape(size * size), alike[k].reshape(size * size)
             base = sight_start[k]
             count = 0
             for i in range(n):
-                at = texel[i]
-                q = sight[at]
-                same = q == sight[at + 1] and q == sight[at + size] and q == sight[at + size + 1]
                 unclear[count] = i
-                # What an image sees does not tell all of its light's way.
-                count += not (same and seen[base + q] == own[i] and folds is None) and gain[i] > zero
+                count += gain[i] > zero and (folds is not None or seen[base + same[texel[i]]] != own[i])
             for j in range(count):
                 i = unclear[j]
                 at = texel[i]

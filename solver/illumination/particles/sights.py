@@ -12,6 +12,7 @@ Maps are traced by rays, which cost as much in a large scene as in a small one, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -48,13 +49,20 @@ class Sights:
     """(s, 16) normals of the four planes through the light and an edge, inwards, of any length; and the
     polygon's plane, with the light on its negative side: what is behind it and within all four is hidden"""
 
+    @cached_property
+    def alike(self) -> Texels:
+        """(m, r, r) polygon that a texel sees, and the three after it to the right and below too; else 0."""
+        alike = np.empty_like(self.texels)
+        _compare(self.texels, alike)
+        return alike
+
     def __len__(self) -> int:
         return len(self.texels)
 
     @property
     def nbytes(self) -> int:
         """Bytes held."""
-        return self.texels.nbytes + self.start.nbytes + self.polygon.nbytes + self.cone.nbytes
+        return 2 * self.texels.nbytes + self.start.nbytes + self.polygon.nbytes + self.cone.nbytes
 
     def part(self, first: int, last: int) -> Sights:
         """The maps of some lights in a row."""
@@ -155,6 +163,20 @@ def number_polygons(
     for k in range(count):
         number[palette[k]] = 0
     return count
+
+
+@kernel
+def _compare(texels: Texels, alike: Texels) -> None:
+    last = texels.shape[1] - 1
+    alike[:, last, :] = 0
+    alike[:, :, last] = 0
+    for light in range(len(texels)):
+        for row in range(last):
+            above, below = texels[light, row], texels[light, row + 1]
+            for column in range(last):
+                q = above[column]
+                same = q == above[column + 1] and q == below[column] and q == below[column + 1]
+                alike[light, row, column] = q if same else 0
 
 
 @kernel

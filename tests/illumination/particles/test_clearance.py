@@ -71,8 +71,8 @@ def test_nothing_leaks_however_near_a_light_is_to_a_wall(sign: float, slant: flo
 def test_a_light_on_the_plane_stays_with_its_patch() -> None:
     """Two floors that meet under the wall: to float64 their lights are in one place."""
     sides = cube(GREY).surfaces.corners
-    left = [[0, 0, 0], [WALL, 0, 0], [WALL, 1, 0], [0, 1, 0]]
-    rest = [[WALL, 0, 0], [1, 0, 0], [1, 1, 0], [WALL, 1, 0]]
+    left = np.array([[0, 0, 0], [WALL, 0, 0], [WALL, 1, 0], [0, 1, 0]])
+    rest = np.array([[WALL, 0, 0], [1, 0, 0], [1, 1, 0], [WALL, 1, 0]])
     of = room(
         *(polygon(f"side{k}", sides[k], GREY) for k in range(1, 6)),
         polygon("left", left, GREY),
