@@ -37,7 +37,7 @@ from solver.illumination.particles.compensation import Known, NearbyLight
 from solver.illumination.particles.receivers import Receivers
 from solver.parallel import run_chunks
 from solver.rendering.surface_points import SurfacePoints
-from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array, IntArray
 
 T = TypeVar("T", bound=np.generic)
 
@@ -83,15 +83,16 @@ class InstantFrame:
         self._blocks = blocks
         self._settings = settings
         self._known = known
-        world, pixels = blocks.world, camera.width * camera.height
+        world = blocks.world
         self._points = [LitPoints.of(p, camera, world) for p in points]
         self._glossy = [GlossyPoints.of(p, world, blocks.polygons) for p in self._points]
         self._receivers = [Receivers.on(blocks.polygons, p.position, p.patch) for p in self._points]
-        self._stream = [p.keys(pixels) * len(points) + k for k, p in enumerate(self._points)]
         self._ring: list[Image | None] = [None] * RING
         self._rest: Image | None = None
         self._spread = Spread()
-        self._seen, self._seen_paths = np.zeros(camera.width * camera.height), 0
+        self._first: Image | None = None
+        self._seen: FloatArray | None = None
+        self._seen_paths = 0
         self._turn = 0
         self._lobe_turn = 0
         if before is not None:
@@ -147,13 +148,14 @@ class InstantFrame:
         lights, lobes = mean_light(images, self._points), mean_gloss(images, self._glossy)
         for points, glossy, light, gloss in zip(self._points, self._glossy, lights, lobes, strict=True):
             add = partial(
-                add_radiance, pixel=points.pixel, patch=points.patch, along=points.along,
-                weight=points.weight, glow=glow, light=light, share=share, picture=picture,
+                add_radiance, pixel=points.pixel, patch=points.patch, position=points.position,
+                eye=points.eye, shown=points.shown, arrival=points.arrival, left=points.left, glow=glow,
+                light=light, share=share, picture=picture,
             )  # fmt: skip
             in_pieces(add, points.shown, len(points))
             row = glossy.row
             if len(row) > 0:
-                lobed = points.weight[row] * surfaces.specular[points.patch[row]] * gloss.T
+                lobed = points.weight(row) * surfaces.specular[points.patch[row]] * gloss.T
                 add_to_pixels(points.pixel[row], share / np.pi * lobed, picture)
         return self._shaped(picture)
 
@@ -226,7 +228,7 @@ class InstantFrame:
                 start, asked = shared_rays(points.patch, every, self._turn)
                 for first in range(0, len(asked), _AT_ONCE):
                     part = asked[first : first + _AT_ONCE]
-                    stream = self._stream[sample][part]
+                    stream = self._stream(sample, part)
                     found, along = near.sample(points.position[part], points.patch[part], stream, turn)
                     # What one finds is for all that stand beside it.
                     run = start[first : first + len(part) + 1]
@@ -238,6 +240,11 @@ class InstantFrame:
                         self._glossy[sample].add_sampled(image.gloss[sample], rows, found, along)
                     yield
         self._turn += rays
+
+    def _stream(self, sample: int, rows: IntArray | Int64Array) -> Int64Array:
+        """Numbers (k,) of points, of which no two of a frame have the same."""
+        pixels = self.camera.width * self.camera.height
+        return self._points[sample].keys(pixels, rows) * len(self._points) + sample
 
     def _send_lobes(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
         """Find the light of narrow lobes, by one ray for every `PATHS_PER_LOBE` paths, over all samples."""
@@ -252,7 +259,7 @@ class InstantFrame:
                     row = glossy.row[part]
                     found = near.glossy.by_rays(
                         near, points.position[row], points.patch[row], glossy.axis[part],
-                        self._stream[sample][row], self._lobe_turn + ray,
+                        self._stream(sample, row), self._lobe_turn + ray,
                     )  # fmt: skip
                     image.gloss[sample][:, part] += found / rays
                     yield
@@ -260,9 +267,14 @@ class InstantFrame:
 
     def _judge(self, fresh: Image) -> None:
         """Learn from how a new image differs from those before."""
+        if self._first is None:
+            self._first = fresh
+            return
+        if self._seen is None:
+            # Frames of cameras that move have one image.
+            self._seen, self._seen_paths = self._reflected(self._first), self._first.paths
         apart, power = take_in(self._seen, self._seen_paths, self._reflected(fresh), fresh.paths)
-        if self._seen_paths > 0:
-            self._spread.learn(self._seen_paths, fresh.paths, apart, power)
+        self._spread.learn(self._seen_paths, fresh.paths, apart, power)
         self._seen_paths += fresh.paths
 
     def _reflected(self, image: Image) -> FloatArray:
@@ -274,13 +286,13 @@ class InstantFrame:
             self._points, self._glossy, image.light, image.gloss, strict=True
         ):
             add = partial(
-                add_luminance, pixel=points.pixel, patch=points.patch, weight=points.weight, matt=matt,
-                light=light, seen=seen,
+                add_luminance, pixel=points.pixel, patch=points.patch, shown=points.shown, left=points.left,
+                matt=matt, light=light, seen=seen,
             )  # fmt: skip
             in_pieces(add, points.shown, len(points))
             row = glossy.row
             if len(row) > 0:
-                value = np.einsum("nc,cn->n", points.weight[row] * shiny[points.patch[row]], lobes)
+                value = np.einsum("nc,cn->n", points.weight(row) * shiny[points.patch[row]], lobes)
                 np.add.at(seen, points.pixel[row], value)
         return seen
 

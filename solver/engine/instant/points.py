@@ -6,25 +6,26 @@ mirrors leave of its light.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from solver.engine.instant.resolve import CHUNK
 from solver.engine.world import World
 from solver.geometry.scene import Camera
+from solver.geometry.surfaces import Surfaces
 from solver.illumination.particles.glossy import gloss_of, is_broad, lobe_axis, lobe_factor
 from solver.illumination.particles.light_lobes import Gloss
 from solver.illumination.particles.mirror_ways import follow, is_glossy, is_mirror, mirrored
 from solver.illumination.particles.receivers import Polygons, Receivers
-from solver.kernels import kernel
-from solver.parallel import run_chunks
 from solver.rendering.surface_points import SurfacePoints
 from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points, Vector
 
 _SAME: Final = 1e-9
 """Points nearer than this times the scene's size are the same."""
+
+_ALL: Final = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,47 +40,70 @@ class LitPoints:
     """(n,)"""
     position: Points
     """(n, 3) metres"""
-    along: FloatArray
-    """(n, 3) unit direction in which the eye's ray arrives"""
-    weight: FloatArray
-    """(n, 3) what the mirrors leave of the light"""
+    eye: Vector
+    """(3,) metres"""
     shown: int
     """Number of points that pixels show themselves"""
+    arrival: FloatArray
+    """(n - shown, 3) unit direction in which the eye's ray arrives at those by mirrors"""
+    left: FloatArray
+    """(n - shown, 3) what the mirrors leave of their light"""
 
     @classmethod
     def of(cls, points: SurfacePoints, camera: Camera, world: World) -> LitPoints:
         """Where the rays of `camera` to `points` end."""
         surfaces, n = world.surfaces, len(points)
-        along, weight = np.empty((n, 3)), np.ones((n, 3))
-        run_chunks(lambda start, stop: _look(start, stop, points.position, camera.eye, along), n, CHUNK)
-        patches: IntArray = np.arange(surfaces.patch_count, dtype=np.int32)
-        mirrors = is_mirror(surfaces, patches)
-        seen = np.flatnonzero(mirrors[points.patch]) if mirrors.any() else patches[:0]
+        depth: IntArray = np.zeros(n, dtype=np.int32)
+        none = np.empty((0, 3))
+        alone = cls(points.pixel, depth, points.patch, points.position, camera.eye, n, none, none)
+        seen = _of_those(is_mirror, surfaces, points.patch)
         if len(seen) == 0:
-            depth = np.zeros(n, dtype=np.int32)
-            return cls(points.pixel, depth, points.patch, points.position, along, weight, n)
+            return alone
         patch = points.patch[seen]
         normal = surfaces.normal[patch]
         start = points.position[seen] + (world.rays.offset / world.rays.scale) * normal
-        ends = follow(
-            surfaces, world.rays, start, mirrored(along[seen], normal), weight=surfaces.specular[patch]
-        )
+        along = mirrored(alone.along(seen), normal)
+        ends = follow(surfaces, world.rays, start, along, weight=surfaces.specular[patch])
         return cls(
             np.concatenate([points.pixel, points.pixel[seen[ends.row]]]),
-            np.concatenate([np.zeros(n, dtype=np.int32), ends.depth + np.int32(1)]),
+            np.concatenate([depth, ends.depth + np.int32(1)]),
             np.concatenate([points.patch, ends.patch]).astype(np.int32),
             np.concatenate([points.position, ends.position]),
-            np.concatenate([along, ends.along]),
-            np.concatenate([weight, ends.weight]),
+            camera.eye,
             n,
+            ends.along,
+            ends.weight,
         )
 
     def __len__(self) -> int:
         return len(self.pixel)
 
-    def keys(self, pixels: int) -> Int64Array:
-        """Numbers (n,) by which points are known, of a frame of so many pixels."""
-        return np.asarray(self.depth.astype(np.int64) * pixels + self.pixel)
+    def along(self, rows: Int64Array) -> FloatArray:
+        """Unit directions (k, 3) in which the eye's rays arrive at the points `rows` (k,)."""
+        along = self.position[rows] - self.eye
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        by_mirrors = np.flatnonzero(rows >= self.shown)
+        along[by_mirrors] = self.arrival[rows[by_mirrors] - self.shown]
+        return np.asarray(along)
+
+    def weight(self, rows: Int64Array) -> FloatArray:
+        """What mirrors leave (k, 3) of the light of the points `rows` (k,)."""
+        weight = np.ones((len(rows), 3))
+        by_mirrors = np.flatnonzero(rows >= self.shown)
+        weight[by_mirrors] = self.left[rows[by_mirrors] - self.shown]
+        return weight
+
+    def keys(self, pixels: int, rows: IntArray | Int64Array | slice = _ALL) -> Int64Array:
+        """Numbers by which points are known, all (n,) or some, of a frame of so many pixels."""
+        return np.asarray(self.depth[rows].astype(np.int64) * pixels + self.pixel[rows])
+
+
+def _of_those(
+    which: Callable[[Surfaces, IntArray], BoolArray], surfaces: Surfaces, patch: IntArray
+) -> Int64Array:
+    """Which points on patches (n,) are on those that `which` tells of."""
+    chosen = which(surfaces, np.arange(surfaces.patch_count, dtype=np.int32))
+    return np.flatnonzero(chosen[patch]) if chosen.any() else np.empty(0, dtype=np.int64)
 
 
 def matched(
@@ -96,21 +120,9 @@ def matched(
     same = (theirs[source] == mine) & (apart <= _SAME * world.surfaces.size)
     same &= np.abs(normal - other).max(axis=1) <= _SAME
     # By mirrors an eye may see the same point from elsewhere.
-    same &= (points.depth == 0) | (np.abs(points.along - before.along[source]).max(axis=1) <= _SAME)
+    rows = np.flatnonzero(same & (points.depth > 0))
+    same[rows] = np.abs(points.along(rows) - before.along(source[rows])).max(axis=1) <= _SAME
     return source, same
-
-
-@kernel
-def _look(start: int, stop: int, position: Points, eye: Vector, along: FloatArray) -> None:
-    """Unit directions (n, 3) from an eye to the points [start, stop)."""
-    for i in range(start, stop):
-        square = 0.0
-        for axis in range(3):
-            along[i, axis] = position[i, axis] - eye[axis]
-            square += along[i, axis] ** 2
-        scale = 1.0 / np.sqrt(square)
-        for axis in range(3):
-            along[i, axis] *= scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +146,9 @@ class GlossyPoints:
     def of(cls, points: LitPoints, world: World, polygons: Polygons) -> GlossyPoints:
         """The glossy ones of `points`."""
         surfaces = world.surfaces
-        patches: IntArray = np.arange(surfaces.patch_count, dtype=np.int32)
-        glossy = is_glossy(surfaces, patches)
-        row = np.flatnonzero(glossy[points.patch]) if glossy.any() else np.empty(0, dtype=np.int64)
+        row = _of_those(is_glossy, surfaces, points.patch)
         patch = points.patch[row]
-        axis = lobe_axis(surfaces, patch, points.along[row])
+        axis = lobe_axis(surfaces, patch, points.along(row))
         is_wide = is_broad(surfaces, patch)
         broad, narrow = np.flatnonzero(is_wide), np.flatnonzero(~is_wide)
         return cls(

@@ -14,7 +14,7 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, Float32Array, FloatArray, Int64Array, IntArray, Points, Vector
 
 CHUNK: Final = 1 << 14
 """Points of a piece of work"""
@@ -74,26 +74,35 @@ def add_radiance(
     stop: int,
     pixel: IntArray,
     patch: IntArray,
-    along: FloatArray,
-    weight: FloatArray,
+    position: Points,
+    eye: Vector,
+    shown: int,
+    arrival: FloatArray,
+    left: FloatArray,
     glow: Glow,
     light: Float32Array,
     share: float,
     picture: FloatArray,
 ) -> None:
-    """Add `share` times weight (n, 3) of what points emit, and reflect of light (3, n), to their pixels."""
+    """Add `share` of what points emit, and reflect of light (3, n), to their pixels (n,).
+
+    Those from `shown` on are seen by mirrors, along `arrival` (n - shown, 3), by `left` (n - shown, 3).
+    """
     for i in range(start, stop):
         p = patch[i]
         lobe = 1.0
         exponent = glow.exponent[p]
         if exponent != 0.0:
-            cosine = 0.0
+            cosine = square = 0.0
             for axis in range(3):
-                cosine -= along[i, axis] * glow.normal[p, axis]
+                along = position[i, axis] - eye[axis] if i < shown else arrival[i - shown, axis]
+                cosine -= along * glow.normal[p, axis]
+                square += along * along
+            cosine /= np.sqrt(square)
             lobe = 0.5 * (exponent + 2.0) * max(cosine, 0.0) ** exponent
         for c in range(3):
             radiance = lobe * glow.emitted[p, c] + glow.reflected[p, c] * light[c, i]
-            picture[pixel[i], c] += share * weight[i, c] * radiance
+            picture[pixel[i], c] += share * (1.0 if i < shown else left[i - shown, c]) * radiance
 
 
 @kernel
@@ -102,7 +111,8 @@ def add_luminance(
     stop: int,
     pixel: IntArray,
     patch: IntArray,
-    weight: FloatArray,
+    shown: int,
+    left: FloatArray,
     matt: FloatArray,
     light: Float32Array,
     seen: FloatArray,
@@ -111,7 +121,7 @@ def add_luminance(
     for i in range(start, stop):
         value = 0.0
         for c in range(3):
-            value += weight[i, c] * matt[patch[i], c] * light[c, i]
+            value += (1.0 if i < shown else left[i - shown, c]) * matt[patch[i], c] * light[c, i]
         seen[pixel[i]] += value
 
 
