@@ -140,7 +140,7 @@ class Drawing:
     def mesh_of(self, world: World, field: RadiosityField) -> RenderMesh:
         """The mesh of a field as gouraud draws it; kept until another field's is asked for."""
         if self._tessellator is None or self._tessellator.surfaces is not world.surfaces:
-            self._tessellator, self._mesh = Tessellator(world.surfaces), None
+            self._tessellator, self._mesh = Tessellator(world.surfaces, self._tessellator), None
         if self._mesh is None or self._mesh.field is not field:
             self._mesh = self._tessellator.mesh(field)
         return self._mesh

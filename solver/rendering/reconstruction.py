@@ -20,115 +20,70 @@ P and G are exact for linear fields on any mesh, and so is the value.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from solver.geometry.surfaces import Surfaces
-from solver.illumination.meshing.topology import Topology
 from solver.kernels import inline_kernel, kernel
 from solver.parallel import core_count, run_chunks
-from solver.transport.field import RadiosityField
+from solver.rendering.plane_points import CHUNK, PlanePoints
 from solver.types import BoolArray, FloatArray, IntArray
-
-_CHUNK: Final = 2048
-"""Leaves or vertices below which a second thread is not worth its while."""
 
 _RANK: Final = 1e-9
 """Neighbours lie on one line if the fit's determinant is at most this times its squared trace."""
 
 
-def vertex_irradiance(field: RadiosityField, surfaces: Surfaces, topology: Topology) -> FloatArray:
-    """Irradiance at the vertices of `topology`, (v, 3) W/m2."""
-    n, v = len(field.patch), len(topology.position)
-    u_axis, v_axis = _axes(surfaces.normal)
-    origin = surfaces.corners[:, 0]
-    flat = np.empty((v, 2))
-    centroid = np.empty((n, 2))
-    means = np.ascontiguousarray(field.irradiance)
-    gradient = np.zeros((n, 2, 3))
-    spread = np.zeros((n, 3))
-    values = np.empty((v, 3))
-    t = topology
-    on_border = np.zeros(v, dtype=np.bool_)
-    leaf, slot = t.border >> 2, t.border & 3
-    on_border[t.vertex[leaf, slot]] = True
-    on_border[t.vertex[leaf, (slot + 1) % field.corner_count[leaf]]] = True
+_NONE: Final = (0.0, 0.0, 0.0)
 
-    def flatten(start: int, stop: int) -> None:
-        _flatten(
-            start, stop, t.vertex, field.corner_count, t.position, field.patch,
-            origin, u_axis, v_axis, flat, centroid,
-        )  # fmt: skip
+_Three: TypeAlias = tuple[float, float, float]
+"""R, G and B. Sums over neighbours are these, which stay in registers, and not arrays, which do not."""
+
+
+@inline_kernel
+def _three(rows: FloatArray, k: int) -> _Three:
+    return rows[k, 0], rows[k, 1], rows[k, 2]
+
+
+@inline_kernel
+def _plus(a: _Three, weight: float, b: _Three) -> _Three:
+    return a[0] + weight * b[0], a[1] + weight * b[1], a[2] + weight * b[2]
+
+
+@inline_kernel
+def _lower(a: _Three, b: _Three) -> _Three:
+    return min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])
+
+
+@inline_kernel
+def _most(a: _Three, b: _Three) -> _Three:
+    """The greater of a and of the magnitude of b."""
+    return max(a[0], abs(b[0])), max(a[1], abs(b[1])), max(a[2], abs(b[2]))
+
+
+def vertex_irradiance(means: FloatArray, points: PlanePoints) -> FloatArray:
+    """Irradiance (v, 3) at the vertices of leaves, from that over each leaf (n, 3), W/m2."""
+    t = points.topology
+    n, v = len(points.corner_count), len(t.position)
+    means = np.ascontiguousarray(means)
+    gradient = np.empty((n, 2, 3))
+    spread = np.empty((n, 3))
+    values = np.empty((v, 3))
 
     def fit(start: int, stop: int) -> None:
         _fit(
-            start, stop, t.vertex, field.corner_count, t.inside_start, t.inside, t.leaf_start, t.leaf_edge,
-            t.hanging_on, centroid, means, gradient, spread,
+            start, stop, t.vertex, points.corner_count, t.inside_start, t.inside, t.leaf_start, t.leaf_edge,
+            t.hanging_on, points.centroid, means, gradient, spread,
         )  # fmt: skip
 
     def evaluate(start: int, stop: int) -> None:
         _evaluate(
-            start, stop, t.leaf_start, t.leaf_edge, t.hanging_on, on_border, flat, centroid, means,
-            gradient, spread, values,
+            start, stop, t.leaf_start, t.leaf_edge, t.hanging_on, points.on_border, points.vertex,
+            points.centroid, means, gradient, spread, values,
         )  # fmt: skip
 
-    for work, count in ((flatten, n), (fit, n), (evaluate, v)):
-        run_chunks(work, count, max(_CHUNK, -(-count // core_count())))
+    for work, count in ((fit, n), (evaluate, v)):
+        run_chunks(work, count, max(CHUNK, -(-count // core_count())))
     return values
-
-
-def _axes(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit vectors (p, 3) each that span the planes of unit normals (p, 3)."""
-    helper = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    u = np.cross(helper, normal)
-    u = u / np.linalg.norm(u, axis=1, keepdims=True)
-    return u, np.cross(normal, u)
-
-
-@kernel
-def _flatten(
-    start: int,
-    stop: int,
-    vertex: IntArray,
-    count: IntArray,
-    position: FloatArray,
-    patch: IntArray,
-    origin: FloatArray,
-    u_axis: FloatArray,
-    v_axis: FloatArray,
-    flat: FloatArray,
-    centroid: FloatArray,
-) -> None:
-    """Coordinates of vertices and centroids of leaves in the planes of their patches."""
-    for leaf in range(start, stop):
-        p = patch[leaf]
-        for k in range(count[leaf]):
-            i = vertex[leaf, k]
-            u = 0.0
-            v = 0.0
-            for axis in range(3):
-                d = position[i, axis] - origin[p, axis]
-                u += d * u_axis[p, axis]
-                v += d * v_axis[p, axis]
-            flat[i, 0] = u
-            flat[i, 1] = v
-        # The centroid is the mean of the centroids of two triangles, weighted by area.
-        a = vertex[leaf, 0]
-        total = 0.0
-        centroid[leaf, 0] = 0.0
-        centroid[leaf, 1] = 0.0
-        for k in range(1, count[leaf] - 1):
-            b = vertex[leaf, k]
-            c = vertex[leaf, k + 1]
-            doubled = (flat[b, 0] - flat[a, 0]) * (flat[c, 1] - flat[a, 1]) - (flat[b, 1] - flat[a, 1]) * (
-                flat[c, 0] - flat[a, 0]
-            )
-            total += doubled
-            for axis in range(2):
-                centroid[leaf, axis] += doubled * (flat[a, axis] + flat[b, axis] + flat[c, axis]) / 3.0
-        centroid[leaf, 0] /= total
-        centroid[leaf, 1] /= total
 
 
 @kernel
@@ -148,58 +103,47 @@ def _fit(
     spread: FloatArray,
 ) -> None:
     """Gradients of leaves, and the largest difference of their means from those of leaves around."""
-    normal = np.empty(3)
-    moment = np.empty((2, 3))
     for leaf in range(start, stop):
-        normal[:] = 0.0
-        moment[:] = 0.0
+        centre_u, centre_v = centroid[leaf, 0], centroid[leaf, 1]
+        mean = _three(means, leaf)
+        # The normal matrix (uu, uv, vv) of the least squares, and its right sides.
+        uu = uv = vv = 0.0
+        along_u, along_v, most = _NONE, _NONE, _NONE
         for k in range(count[leaf]):
             # All vertices on the edge: its start, and those inside it.
             edge = 4 * leaf + k
             for i in range(inside_start[edge] - 1, inside_start[edge + 1]):
                 v = vertex[leaf, k] if i < inside_start[edge] else inside[i]
-                for j in range(leaf_start[v], leaf_start[v + 1]):
-                    _add_neighbour(leaf, leaf_edge[j] >> 2, centroid, means, normal, moment, spread)
-                if hanging_on[v] >= 0:
-                    _add_neighbour(leaf, hanging_on[v], centroid, means, normal, moment, spread)
-        trace = normal[0] + normal[2]
-        if trace == 0.0:
-            continue
-        determinant = normal[0] * normal[2] - normal[1] * normal[1]
+                last = leaf_start[v + 1] + (1 if hanging_on[v] >= 0 else 0)
+                for j in range(leaf_start[v], last):
+                    other = leaf_edge[j] >> 2 if j < leaf_start[v + 1] else hanging_on[v]
+                    if other == leaf:
+                        continue
+                    du = centroid[other, 0] - centre_u
+                    dv = centroid[other, 1] - centre_v
+                    weight = 1.0 / (du * du + dv * dv)
+                    wu, wv = weight * du, weight * dv
+                    uu += wu * du
+                    uv += wu * dv
+                    vv += wv * dv
+                    difference = _plus(_three(means, other), -1.0, mean)
+                    along_u = _plus(along_u, wu, difference)
+                    along_v = _plus(along_v, wv, difference)
+                    most = _most(most, difference)
+        trace = uu + vv
+        determinant = uu * vv - uv * uv
         for c in range(3):
-            if determinant > _RANK * trace * trace:
-                gradient[leaf, 0, c] = (normal[2] * moment[0, c] - normal[1] * moment[1, c]) / determinant
-                gradient[leaf, 1, c] = (normal[0] * moment[1, c] - normal[1] * moment[0, c]) / determinant
+            spread[leaf, c] = most[c]
+            if trace == 0.0:
+                gradient[leaf, 0, c] = 0.0
+                gradient[leaf, 1, c] = 0.0
+            elif determinant > _RANK * trace * trace:
+                gradient[leaf, 0, c] = (vv * along_u[c] - uv * along_v[c]) / determinant
+                gradient[leaf, 1, c] = (uu * along_v[c] - uv * along_u[c]) / determinant
             else:
                 # All neighbours in one direction: nothing is known across it.
-                gradient[leaf, 0, c] = moment[0, c] / trace
-                gradient[leaf, 1, c] = moment[1, c] / trace
-
-
-@inline_kernel
-def _add_neighbour(
-    leaf: int,
-    other: int,
-    centroid: FloatArray,
-    means: FloatArray,
-    normal: FloatArray,
-    moment: FloatArray,
-    spread: FloatArray,
-) -> None:
-    """Add one neighbour to the normal equations of a leaf's gradient."""
-    if other == leaf:
-        return
-    du = centroid[other, 0] - centroid[leaf, 0]
-    dv = centroid[other, 1] - centroid[leaf, 1]
-    weight = 1.0 / (du * du + dv * dv)
-    normal[0] += weight * du * du
-    normal[1] += weight * du * dv
-    normal[2] += weight * dv * dv
-    for c in range(3):
-        difference = means[other, c] - means[leaf, c]
-        moment[0, c] += weight * du * difference
-        moment[1, c] += weight * dv * difference
-        spread[leaf, c] = max(spread[leaf, c], abs(difference))
+                gradient[leaf, 0, c] = along_u[c] / trace
+                gradient[leaf, 1, c] = along_v[c] / trace
 
 
 @kernel
@@ -218,22 +162,10 @@ def _evaluate(
     values: FloatArray,
 ) -> None:
     """Values at vertices from the leaves around them: steps 2 to 4."""
-    mean = np.empty(3)
-    planes = np.empty(3)
-    slope = np.empty((2, 3))
-    low = np.empty(3)
-    high = np.empty(3)
-    reach = np.empty(3)
     for v in range(start, stop):
-        mean[:] = 0.0
-        planes[:] = 0.0
-        slope[:] = 0.0
-        low[:] = np.inf
-        high[:] = 0.0
-        reach[:] = 0.0
-        total = 0.0
-        at_u = 0.0
-        at_v = 0.0
+        total = at_u = at_v = 0.0
+        mean, planes, slope_u, slope_v = _NONE, _NONE, _NONE, _NONE
+        low, high, reach = (np.inf, np.inf, np.inf), _NONE, _NONE
         last = leaf_start[v + 1] + (1 if hanging_on[v] >= 0 else 0)
         for j in range(leaf_start[v], last):
             leaf = leaf_edge[j] >> 2 if j < leaf_start[v + 1] else hanging_on[v]
@@ -243,21 +175,20 @@ def _evaluate(
             total += weight
             at_u += weight * du
             at_v += weight * dv
-            for c in range(3):
-                value = means[leaf, c]
-                low[c] = min(low[c], value)
-                high[c] = max(high[c], value)
-                reach[c] = max(reach[c], spread[leaf, c])
-                mean[c] += weight * value
-                slope[0, c] += weight * gradient[leaf, 0, c]
-                slope[1, c] += weight * gradient[leaf, 1, c]
-                planes[c] += weight * (value + gradient[leaf, 0, c] * du + gradient[leaf, 1, c] * dv)
+            value = _three(means, leaf)
+            low, high = _lower(low, value), _most(high, value)
+            reach = _most(reach, _three(spread, leaf))
+            mean = _plus(mean, weight, value)
+            along_u, along_v = _three(gradient[:, 0], leaf), _three(gradient[:, 1], leaf)
+            slope_u = _plus(slope_u, weight, along_u)
+            slope_v = _plus(slope_v, weight, along_v)
+            planes = _plus(planes, weight, _plus(_plus(value, du, along_u), dv, along_v))
         for c in range(3):
-            carried = (slope[0, c] * at_u + slope[1, c] * at_v) / (total * total)
+            carried = (slope_u[c] * at_u + slope_v[c] * at_v) / (total * total)
             carried = min(max(carried, -reach[c]), reach[c])
             p = mean[c] / total + carried
-            value = (p + 2.0 * planes[c] / total) / 3.0
+            least, greatest = low[c], high[c]
             if on_border[v]:
-                low[c] = max(min(low[c], p), 0.0)
-                high[c] = max(high[c], p)
-            values[v, c] = min(max(value, low[c]), high[c])
+                least = max(min(least, p), 0.0)
+                greatest = max(greatest, p)
+            values[v, c] = min(max((p + 2.0 * planes[c] / total) / 3.0, least), greatest)

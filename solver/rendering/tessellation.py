@@ -3,6 +3,9 @@
 A leaf is drawn as the polygon of its corners and of all vertices inside its edges, its own patch's and,
 along seams, those of other patches. A polygon with none of these is cut along a diagonal, the one whose
 ends differ less; with one, it is a fan from that vertex; with more, a fan from a vertex in its middle.
+Triangles come patch by patch, so that which of two
+patches at one depth is drawn does not depend on how they are divided.
+
 Vertices are shared in a patch. Vertices of different patches on a common seam coincide.
 
 Coordinates are local: centred on the scene and divided by its size, so that float32 keeps its digits
@@ -16,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.meshing.seams import Seams, cut_borders, find_lines
-from solver.illumination.meshing.topology import Topology, connect
+from solver.illumination.meshing.seams import find_lines
 from solver.kernels import inline_kernel, kernel
 from solver.rendering.middles import fill_middles
+from solver.rendering.outlines import Outlines, outline
 from solver.rendering.reconstruction import vertex_irradiance
 from solver.transport.field import RadiosityField
-from solver.types import LUMINANCE_WEIGHTS, BoolArray, Float32Array, FloatArray, IntArray, Points
+from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,141 +52,100 @@ class RenderMesh:
     """(n, 3) W/(m2 sr)"""
 
 
-@dataclass(frozen=True, eq=False)
-class _Outlines:
-    """The vertices of leaves, with everything inside their edges."""
-
-    topology: Topology
-    seams: Seams
-    inside_start: IntArray
-    """(4 n + 1,)"""
-    inside: IntArray
-    """Vertices inside edges, in the order of the edge; those from seams follow the topology's"""
-    middle: IntArray
-    """(n,) the vertex in the middle of a leaf, or -1"""
-    position: Float32Array
-    patch: IntArray
-
-
 class Tessellator:
     """Makes meshes for the fields of one scene; what does not change between two fields is kept."""
 
-    def __init__(self, surfaces: Surfaces) -> None:
+    def __init__(self, surfaces: Surfaces, before: Tessellator | None = None) -> None:
+        """For fields over `surfaces`; `before`, of an earlier revision, may know some of their leaves."""
         self.surfaces = surfaces
         self._lines = find_lines(surfaces)
         self._field: RadiosityField | None = None
-        self._outlines: _Outlines | None = None
+        self._outlines: Outlines | None = None if before is None else before._outlines
 
     def mesh(self, field: RadiosityField) -> RenderMesh:
-        """The mesh of `field`, a field over these surfaces."""
+        """The mesh of `field`, a field over these surfaces.
+
+        Fields with the same leaves share all but light: least is done where their arrays are the same
+        objects. Nobody writes into an array of a field.
+        """
         outlines = self._outlines_of(field)
-        irradiance = _all_values(field, outlines, vertex_irradiance(field, self.surfaces, outlines.topology))
-        triangles, leaf = _triangulate(field, outlines, irradiance)
-        reflectance = self.surfaces.reflectance[outlines.patch]
-        emission = self.surfaces.emission[outlines.patch]
+        irradiance, radiance, luminance = _shade(_all_values(field, outlines), outlines)
         return RenderMesh(
             field=field,
             surfaces=self.surfaces,
             position=outlines.position,
             patch=outlines.patch,
-            irradiance=irradiance.astype(np.float32),
-            radiance=((emission + reflectance * irradiance) / np.pi).astype(np.float32),
-            triangles=triangles,
-            leaf=leaf,
+            irradiance=irradiance,
+            radiance=radiance,
+            triangles=_triangulate(outlines, luminance),
+            leaf=outlines.leaf,
             leaf_irradiance=field.irradiance.astype(np.float32),
             leaf_radiance=(field.radiosity / np.pi).astype(np.float32),
         )
 
-    def _outlines_of(self, field: RadiosityField) -> _Outlines:
+    def _outlines_of(self, field: RadiosityField) -> Outlines:
         known = self._field
-        if (
-            self._outlines is None
-            or known is None
-            or not np.array_equal(known.patch, field.patch)
-            or not np.array_equal(known.corners, field.corners)
-        ):
-            topology = connect(field)
-            seams = cut_borders(topology, field, self.surfaces, self._lines)
-            self._outlines = _outline(field, self.surfaces, topology, seams)
+        if self._outlines is None or known is None or not _have_same_leaves(known, field):
+            self._outlines = outline(field, self.surfaces, self._lines, self._outlines)
         self._field = field
         return self._outlines
 
 
-def _outline(field: RadiosityField, surfaces: Surfaces, topology: Topology, seams: Seams) -> _Outlines:
-    n, v, s = len(field.patch), len(topology.position), len(seams.edge)
-    # An edge has vertices from its own patch or from a seam, never both: sorting by edge joins them.
-    own = np.diff(topology.inside_start)
-    edge = np.concatenate([np.repeat(np.arange(4 * n, dtype=np.int32), own), seams.edge])
-    vertex = np.concatenate([topology.inside, np.arange(v, v + s, dtype=np.int32)])
-    inside_start = np.zeros(4 * n + 1, dtype=np.int32)
-    np.cumsum(np.bincount(edge, minlength=4 * n), out=inside_start[1:])
-    extra = inside_start[4::4] - inside_start[:-1:4]
-    has_middle = extra > 1
-    middle = np.full(n, -1, dtype=np.int32)
-    middle[has_middle] = np.arange(v + s, v + s + np.count_nonzero(has_middle), dtype=np.int32)
-    position = np.concatenate([topology.position, seams.position, _middles(field, has_middle)])
-    patch = np.empty(len(topology.position), dtype=np.int32)
-    patch[topology.vertex] = field.patch[:, None]
-    return _Outlines(
-        topology=topology,
-        seams=seams,
-        inside_start=inside_start,
-        inside=vertex[np.argsort(edge, kind="stable")],
-        middle=middle,
-        position=((position - surfaces.center) / surfaces.size).astype(np.float32),
-        patch=np.concatenate([patch, field.patch[seams.edge >> 2], field.patch[has_middle]]),
-    )
+def _have_same_leaves(a: RadiosityField, b: RadiosityField) -> bool:
+    pairs = ((a.patch, b.patch), (a.corner_count, b.corner_count), (a.corners, b.corners))
+    return all(one is other or np.array_equal(one, other) for one, other in pairs)
 
 
-def _middles(field: RadiosityField, chosen: BoolArray) -> Points:
-    """Middles of the leaves that are `chosen`."""
-    corners, count = field.corners[chosen], field.corner_count[chosen]
-    total = corners.sum(axis=1)
-    total[count == 3] -= corners[count == 3, 3]
-    return np.asarray(total / count[:, None])
-
-
-def _all_values(field: RadiosityField, outlines: _Outlines, values: FloatArray) -> FloatArray:
-    """Irradiance at all vertices of the mesh, from that at the topology's."""
-    vertex, seams = outlines.topology.vertex, outlines.seams
+def _all_values(field: RadiosityField, outlines: Outlines) -> FloatArray:
+    """Irradiance at all vertices of the mesh, W/m2."""
+    blocks, seams = outlines.blocks, outlines.seams
+    means = field.irradiance.take(blocks.order, axis=0)
+    values = vertex_irradiance(means, outlines.points)
     # Along an edge, linear: the patch looks as if nobody had cut its border.
+    vertex = outlines.connections.topology.vertex
     leaf, slot = seams.edge >> 2, seams.edge & 3
     start = values[vertex[leaf, slot]]
-    end = values[vertex[leaf, (slot + 1) % field.corner_count[leaf]]]
+    end = values[vertex[leaf, (slot + 1) % blocks.corner_count[leaf]]]
     on_seams = start + seams.fraction[:, None] * (end - start)
-    chosen = np.flatnonzero(outlines.middle >= 0)
-    in_middles = np.empty((len(chosen), 3))
+    fans = np.flatnonzero(outlines.middle >= 0)
+    in_middles = np.empty((len(fans), 3))
     fill_middles(
-        field.corners[chosen],
-        field.corner_count[chosen],
-        vertex[chosen],
-        field.irradiance[chosen],
-        values,
-        in_middles,
+        blocks.corners[fans], blocks.corner_count[fans], vertex[fans], means[fans], values, in_middles
     )
     return np.concatenate([values, on_seams, in_middles])
 
 
-def _triangulate(
-    field: RadiosityField, outlines: _Outlines, irradiance: FloatArray
-) -> tuple[IntArray, IntArray]:
-    """Triangles (t, 3) of all leaves, and the leaf of each."""
-    extra = outlines.inside_start[4::4] - outlines.inside_start[:-1:4]
-    pieces = field.corner_count + extra - np.where(outlines.middle < 0, np.int32(2), np.int32(0))
-    start = np.zeros(len(pieces) + 1, dtype=np.int32)
-    np.cumsum(pieces, out=start[1:])
-    triangles = np.empty((int(start[-1]), 3), dtype=np.int32)
+def _shade(values: FloatArray, outlines: Outlines) -> tuple[Float32Array, Float32Array, FloatArray]:
+    """Irradiance (v, 3), radiance (v, 3) and the luminance of the irradiance (v,)."""
+    surfaces = outlines.surfaces
+    irradiance, radiance = np.empty(values.shape, np.float32), np.empty(values.shape, np.float32)
+    _fill_radiance(outlines.patch, surfaces.emission, surfaces.reflectance, values, irradiance, radiance)
+    return irradiance, radiance, values @ LUMINANCE_WEIGHTS
+
+
+def _triangulate(outlines: Outlines, luminance: FloatArray) -> IntArray:
+    """Triangles (t, 3) of all leaves."""
+    triangles = np.empty((len(outlines.leaf), 3), dtype=np.int32)
     _fill_triangles(
-        outlines.topology.vertex,
-        field.corner_count,
-        outlines.inside_start,
-        outlines.inside,
-        outlines.middle,
-        irradiance @ LUMINANCE_WEIGHTS,
-        start,
-        triangles,
-    )
-    return triangles, np.repeat(np.arange(len(pieces), dtype=np.int32), pieces)
+        outlines.connections.topology.vertex, outlines.blocks.corner_count, outlines.inside_start,
+        outlines.inside, outlines.middle, luminance, outlines.first_triangle, triangles,
+    )  # fmt: skip
+    return triangles
+
+
+@kernel
+def _fill_radiance(
+    patch: IntArray,
+    emission: FloatArray,
+    reflectance: FloatArray,
+    values: FloatArray,
+    irradiance: Float32Array,
+    radiance: Float32Array,
+) -> None:
+    for i in range(len(patch)):
+        for c in range(3):
+            irradiance[i, c] = values[i, c]
+            radiance[i, c] = (emission[patch[i], c] + reflectance[patch[i], c] * values[i, c]) / np.pi
 
 
 @kernel

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +9,7 @@ from hypothesis import strategies as st
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.meshing.topology import Topology, connect
+from solver.rendering.plane_points import plane_points
 from solver.rendering.reconstruction import vertex_irradiance
 from solver.rendering.tessellation import Tessellator
 from solver.transport.field import RadiosityField
@@ -41,7 +40,7 @@ def with_means(surfaces: Surfaces, depth: int, function: Function) -> FloatArray
         for y, wy in zip(nodes, weights, strict=True):
             mean += 0.25 * wx * wy * function(low + across * np.array([x + 1, y + 1, 0.0]) / 2)
     topology = connect(field)
-    values = vertex_irradiance(replace(field, irradiance=mean), surfaces, topology)
+    values = vertex_irradiance(mean, plane_points(field, surfaces, topology))
     return np.asarray(np.abs(values - function(topology.position)).max(axis=1))
 
 
@@ -68,7 +67,10 @@ def test_linear_fields_are_exact_inside_a_patch(
     function = linear(slope, 5.0)
     field = build_field(surfaces, uneven(seed, depth), function)
     topology = connect(field)
-    error = np.abs(vertex_irradiance(field, surfaces, topology) - function(topology.position)).max(axis=1)
+    error = np.abs(
+        vertex_irradiance(field.irradiance, plane_points(field, surfaces, topology))
+        - function(topology.position)
+    ).max(axis=1)
     # At the border, extrapolation is bounded by what the leaves around differ: the inside is exact.
     assert error[inside_patch(field, topology)].max(initial=0.0) < 1e-9
 
@@ -79,7 +81,7 @@ def test_linear_fields_are_exact_to_the_border_on_even_meshes(name: str) -> None
     function = linear((0.7, -0.4, 0.2), 5.0)
     field = build_field(surfaces, even(3), function)
     topology = connect(field)
-    values = vertex_irradiance(field, surfaces, topology)
+    values = vertex_irradiance(field.irradiance, plane_points(field, surfaces, topology))
     np.testing.assert_allclose(values, function(topology.position), rtol=1e-10)
 
 
@@ -103,7 +105,7 @@ def test_values_stay_between_the_darkest_and_the_brightest_around_a_step(seed: i
         surfaces, uneven(seed, depth), lambda p: np.repeat((p[:, :1] > 0.37).astype(float), 3, axis=1)
     )
     topology = connect(field)
-    values = vertex_irradiance(field, surfaces, topology)
+    values = vertex_irradiance(field.irradiance, plane_points(field, surfaces, topology))
     inside = values[inside_patch(field, topology)]
     assert inside.max(initial=0.0) <= 1.0
     # On the border a value may leave the range upwards, by what the leaves around differ.
