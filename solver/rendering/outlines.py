@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.meshing.seams import SeamLines, Seams, cut_borders
 from solver.kernels import kernel
 from solver.rendering.connections import Connections
 from solver.rendering.leaf_blocks import LeafBlocks, earlier_patches
 from solver.rendering.plane_points import PlanePoints, plane_points
+from solver.rendering.seam_cuts import SeamCuts
 from solver.transport.field import RadiosityField
 from solver.types import Corners, Float32Array, IntArray, Points
 
@@ -28,7 +28,7 @@ class Outlines:
     blocks: LeafBlocks
     connections: Connections
     points: PlanePoints
-    seams: Seams
+    cuts: SeamCuts
     inside_start: IntArray
     """(4 n + 1,)"""
     inside: IntArray
@@ -45,7 +45,7 @@ class Outlines:
     """(t,) the field's leaf of each triangle"""
 
 
-def outline(field: RadiosityField, surfaces: Surfaces, lines: SeamLines, before: Outlines | None) -> Outlines:
+def outline(field: RadiosityField, surfaces: Surfaces, before: Outlines | None) -> Outlines:
     """The outlines of the leaves of `field`, with what is as it was `before` taken over."""
     blocks = LeafBlocks.of(field, surfaces.patch_count)
     if before is None:
@@ -54,9 +54,10 @@ def outline(field: RadiosityField, surfaces: Surfaces, lines: SeamLines, before:
     else:
         earlier = earlier_patches(surfaces, before.surfaces)
         known, connections = before.blocks, before.connections
-    connections = connections.updated(blocks, blocks.as_before(known, earlier))
-    topology = connections.topology
-    seams = cut_borders(topology, blocks, surfaces, lines)
+    earlier = blocks.as_before(known, earlier)
+    connections = connections.updated(blocks, earlier)
+    cuts = SeamCuts.of(blocks, connections, surfaces, None if before is None else before.cuts, earlier)
+    topology, seams = connections.topology, cuts.seams
     n, v, s = len(blocks.patch), len(topology.position), len(seams.edge)
     inside_start = np.empty(4 * n + 1, dtype=np.int32)
     inside = np.empty(len(topology.inside) + s, dtype=np.int32)
@@ -76,7 +77,7 @@ def outline(field: RadiosityField, surfaces: Surfaces, lines: SeamLines, before:
         blocks=blocks,
         connections=connections,
         points=plane_points(blocks, surfaces, topology),
-        seams=seams,
+        cuts=cuts,
         inside_start=inside_start,
         inside=inside,
         middle=middle,

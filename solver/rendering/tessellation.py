@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.meshing.seams import find_lines
 from solver.kernels import inline_kernel, kernel
 from solver.rendering.middles import fill_middles
 from solver.rendering.outlines import Outlines, outline
@@ -58,7 +57,6 @@ class Tessellator:
     def __init__(self, surfaces: Surfaces, before: Tessellator | None = None) -> None:
         """For fields over `surfaces`; `before`, of an earlier revision, may know some of their leaves."""
         self.surfaces = surfaces
-        self._lines = find_lines(surfaces)
         self._field: RadiosityField | None = None
         self._outlines: Outlines | None = None if before is None else before._outlines
 
@@ -86,7 +84,7 @@ class Tessellator:
     def _outlines_of(self, field: RadiosityField) -> Outlines:
         known = self._field
         if self._outlines is None or known is None or not _have_same_leaves(known, field):
-            self._outlines = outline(field, self.surfaces, self._lines, self._outlines)
+            self._outlines = outline(field, self.surfaces, self._outlines)
         self._field = field
         return self._outlines
 
@@ -98,7 +96,7 @@ def _have_same_leaves(a: RadiosityField, b: RadiosityField) -> bool:
 
 def _all_values(field: RadiosityField, outlines: Outlines) -> FloatArray:
     """Irradiance at all vertices of the mesh, W/m2."""
-    blocks, seams = outlines.blocks, outlines.seams
+    blocks, seams = outlines.blocks, outlines.cuts.seams
     means = field.irradiance.take(blocks.order, axis=0)
     values = vertex_irradiance(means, outlines.points)
     # Along an edge, linear: the patch looks as if nobody had cut its border.
