@@ -104,7 +104,7 @@ class _Timed(LightBlocks):
         block: LightBlock,
         batch: int,
         bound: float,
-        factor: float = 1.0,
+        factor: float | Float32Array = 1.0,
         gloss: Gloss | None = None,
     ) -> None:
         start = time.perf_counter()

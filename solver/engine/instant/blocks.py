@@ -74,9 +74,9 @@ class LightBlock:
         """Whether what all of its lights see is in memory."""
         return all(sights is not None for sights in self.sights)
 
-    def batch(self, number: int, factor: float = 1.0) -> ShiningLights:
-        """Some of its lights, `factor` times as strong."""
-        return self.lights.part(number * BATCH, (number + 1) * BATCH, factor)
+    def batch(self, number: int) -> ShiningLights:
+        """Some of its lights."""
+        return self.lights.part(number * BATCH, (number + 1) * BATCH)
 
 
 class LightBlocks:
@@ -129,15 +129,16 @@ class LightBlocks:
         block: LightBlock,
         batch: int,
         bound: float,
-        factor: float = 1.0,
+        factor: float | Float32Array = 1.0,
         gloss: Gloss | None = None,
     ) -> None:
         """Add to `light` (3, n) W/m2 what a batch and its images give, `factor` times as strong.
 
-        `bound` and `gloss` are those of `add_light`.
+        With an array (m,) each light has a factor of its own, and so have its images. `bound` and `gloss`
+        are those of `add_light`.
         """
         sights, folded = self._look(block, batch)
-        add_light(light, receivers, block.batch(batch, factor), sights, bound, None, gloss)
+        add_light(light, receivers, block.batch(batch).scaled(factor), sights, bound, None, gloss)
         if folded is not None:
             images = folded.scaled(factor)
             add_light(light, receivers, images.lights, images.sights, bound, images.folds, gloss)

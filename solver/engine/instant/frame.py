@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.engine.instant.blocks import FIRST, RING, LightBlock, LightBlocks, block_paths
+from solver.engine.instant.dealing import Dealer
 from solver.engine.instant.image import Image, joined, mean_gloss, mean_light
 from solver.engine.instant.nearby import HELPERS, PATHS_PER_RAY, nearby_light, shared_rays
 from solver.engine.instant.points import GlossyPoints, LitPoints, matched
@@ -93,6 +94,7 @@ class InstantFrame:
         self._first: Image | None = None
         self._seen: FloatArray | None = None
         self._seen_paths = 0
+        self._dealt = Dealer(len(points))
         self._turn = 0
         self._lobe_turn = 0
         if before is not None:
@@ -188,22 +190,20 @@ class InstantFrame:
 
     def _shine(self, image: Image, number: int) -> Iterator[None]:
         """Collect the light of a block."""
-        samples = len(self._points)
         block = self._blocks.block(number)
         yield
         bound = self._settings.bound
         for batch in range(len(block.sights)):
             self._blocks.sights(block, batch)
             yield
-            # Each sample has its share of the batches, as much stronger: a pixel has all.
-            sample = (batch + number) % samples
-            self._blocks.shine(image.light[sample], self._receivers[sample], block, batch, bound, samples)
-            glossy = self._glossy[sample]
-            if len(glossy.broad) > 0:
-                light = np.zeros((3, len(glossy.broad)), dtype=np.float32)
-                self._blocks.shine(light, glossy.receivers, block, batch, bound, samples, glossy.gloss)
-                image.gloss[sample][:, glossy.broad] += light
-            yield
+            for sample, factor in self._dealt.deal(block, batch):
+                self._blocks.shine(image.light[sample], self._receivers[sample], block, batch, bound, factor)
+                glossy = self._glossy[sample]
+                if len(glossy.broad) > 0:
+                    light = np.zeros((3, len(glossy.broad)), dtype=np.float32)
+                    self._blocks.shine(light, glossy.receivers, block, batch, bound, factor, glossy.gloss)
+                    image.gloss[sample][:, glossy.broad] += light
+                yield
         if self._settings.compensates and np.isfinite(bound):
             yield from self._compensate(image, block, self._nearby(block, HELPERS))
         if any(len(glossy.narrow) > 0 for glossy in self._glossy):

@@ -86,10 +86,13 @@ class FoldedLights:
         """Bytes held."""
         return self.sights.nbytes + self.folds.pyramid.nbytes + self.folds.clip.nbytes
 
-    def scaled(self, factor: float) -> FoldedLights:
-        """`factor` times as strong."""
-        power = np.float32(factor) * self.lights.power
-        return replace(self, lights=replace(self.lights, power=power))
+    def scaled(self, factor: float | Float32Array) -> FoldedLights:
+        """`factor` times as strong, or each light and its images by that of the light (m,)."""
+        source = np.arange(len(self.lights))
+        while np.any(self.folds.parent[source] >= 0):
+            source = np.where(self.folds.parent[source] >= 0, self.folds.parent[source], source)
+        each = np.broadcast_to(np.float32(factor), self.folds.first)[source]
+        return replace(self, lights=self.lights.scaled(each))
 
 
 def look_through(

@@ -95,23 +95,28 @@ class ShiningLights:
     def __len__(self) -> int:
         return len(self.lobe)
 
-    def take(self, rows: Int64Array, factor: float = 1.0) -> ShiningLights:
-        """Those with the indices `rows`, `factor` times as strong."""
+    def take(self, rows: Int64Array) -> ShiningLights:
+        """Those with the indices `rows`."""
         return ShiningLights(
             np.ascontiguousarray(self.frames[:, rows]),
-            np.float32(factor) * self.power[rows],
+            self.power[rows],
             self.lobe[rows],
             self.least_bound[rows],
         )
 
-    def part(self, first: int, last: int, factor: float = 1.0) -> ShiningLights:
-        """The lights [first, last), `factor` times as strong."""
+    def part(self, first: int, last: int) -> ShiningLights:
+        """The lights [first, last)."""
         return ShiningLights(
             np.ascontiguousarray(self.frames[:, first:last]),
-            np.float32(factor) * self.power[first:last],
+            self.power[first:last],
             self.lobe[first:last],
             self.least_bound[first:last],
         )
+
+    def scaled(self, factor: float | Float32Array) -> ShiningLights:
+        """All of them, `factor` times as strong, or each by its own (m,); without power they cost nothing."""
+        each = np.broadcast_to(np.float32(factor), len(self))
+        return replace(self, power=each[:, None] * self.power)
 
 
 def add_light(
@@ -179,7 +184,9 @@ def _light(
         red, green, blue = irradiance[0, first:last], irradiance[1, first:last], irradiance[2, first:last]
         is_flat = _bounds(receivers, first, last, low, high)
         for k in range(first_of(folds), lights.shape[1]):
-            # Whole blocks behind the light, or with the light behind them.
+            # Whole blocks behind the light, or with the light behind them, and lights without power.
+            if power[k, 0] == zero and power[k, 1] == zero and power[k, 2] == zero:
+                continue
             reach = zero
             for axis in range(3):
                 a = lights[3 + axis, k]

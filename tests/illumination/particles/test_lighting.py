@@ -92,7 +92,10 @@ def test_light_is_added_to_what_is_there() -> None:
     add_light(whole, receivers, shining, sights, np.inf)
     parts = np.full((3, 300), 7.0, dtype=np.float32)
     for first in range(0, len(lights), 5):
-        part, seen = shining.part(first, first + 5, 2.0), sights.part(first, min(first + 5, len(lights)))
+        part, seen = (
+            shining.part(first, first + 5).scaled(2.0),
+            sights.part(first, min(first + 5, len(lights))),
+        )
         add_light(parts, receivers, part, seen, np.inf)
     np.testing.assert_allclose(parts - 7.0, 2.0 * (whole - 7.0), rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(whole[1:] - 7.0, (whole[0] - 7.0) * [[2.0], [3.0]], rtol=1e-4, atol=1e-5)
