@@ -1,4 +1,4 @@
-"""Arrays that grow: capacity doubles, the live part is a view."""
+"""Arrays that grow: capacity grows by half, the live part is a view."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T", bound=np.generic)
 
 
 class GrowingArray(Generic[T]):
-    """An array whose first axis grows by appending, at amortised constant cost."""
+    """An array whose first axis grows by appending, at amortised constant cost; capacity grows by half."""
 
     def __init__(self, shape: tuple[int, ...], dtype: type[T], capacity: int = 256) -> None:
         self._data: NDArray[T] = np.zeros((capacity, *shape), dtype=dtype)
@@ -40,10 +40,24 @@ class GrowingArray(Generic[T]):
         """Append rows."""
         self._extend(len(rows))[...] = rows
 
+    def truncate(self, count: int) -> None:
+        """Keep the first `count` rows."""
+        self._size = min(self._size, count)
+
+    def trim(self) -> None:
+        """Give capacity back beyond what a few more rows will need."""
+        enough = self._size + self._size // 16
+        if enough < len(self._data):
+            kept: NDArray[T] = np.empty((enough, *self._data.shape[1:]), self._data.dtype)
+            kept[: self._size] = self.live
+            self._data = kept
+
     def _extend(self, count: int) -> NDArray[T]:
         needed = self._size + count
         if needed > len(self._data):
-            grown = np.empty((max(needed, 2 * len(self._data)), *self._data.shape[1:]), self._data.dtype)
+            grown = np.empty(
+                (max(needed, len(self._data) + len(self._data) // 2), *self._data.shape[1:]), self._data.dtype
+            )
             grown[: self._size] = self._data[: self._size]
             self._data = grown
         fresh = self._data[self._size : needed]

@@ -8,7 +8,8 @@ addition, where it is now, however many places it passed through.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,10 +25,12 @@ _MOVE: Final = "move"
 class Progress:
     """How a solution stands, as far as the log cares."""
 
-    share_done: float
-    """0 to 1 of the way from the latest edit to a settled solution"""
+    owed: Mapping[int, float]
+    """W of luminance that is still to be redistributed for each revision"""
+    unshot: float
+    """W of luminance that has arrived and is still to be propagated"""
     shots: int
-    """Links shot over since then"""
+    """Links shot over since the latest edit"""
     is_settled: bool
 
 
@@ -48,7 +51,7 @@ class ChangeLog:
 
     def add(self, changes: Sequence[Change], progress: Progress) -> None:
         """Take in what an edit has changed, and remember how far those before it had got."""
-        self._entries = [_told(entry, progress) for entry in self._entries]
+        self._entries = list(_told(self._entries, progress))
         for change in changes:
             self._append(change)
         self._count += len(changes)
@@ -56,7 +59,7 @@ class ChangeLog:
 
     def entries(self, progress: Progress) -> tuple[Change, ...]:
         """All entries as they stand."""
-        told = tuple(_told(entry, progress) for entry in self._entries)
+        told = _told(self._entries, progress)
         if progress.is_settled:
             self._entries = list(told)
         return told
@@ -75,21 +78,35 @@ class ChangeLog:
         self._entries.append(change)
 
 
-def _told(entry: Change, progress: Progress) -> Change:
-    """An entry with what has been done for it so far."""
-    if entry.state is ChangeState.SETTLED:
-        return entry
-    if progress.is_settled:
-        return replace(
-            entry,
-            state=ChangeState.SETTLED,
-            energy_to_redistribute=0.0,
-            shots=entry.shots + progress.shots,
-        )
-    begun = progress.share_done > 0.0 or entry.shots > 0 or progress.shots > 0
-    return replace(
-        entry,
-        state=ChangeState.REDISTRIBUTING if begun else ChangeState.PENDING,
-        energy_to_redistribute=entry.energy_to_redistribute * (1.0 - progress.share_done),
-        shots=entry.shots + progress.shots,
+def _told(entries: Sequence[Change], progress: Progress) -> tuple[Change, ...]:
+    """The entries with what has been done for them so far."""
+    open_ones = [entry for entry in entries if entry.state is not ChangeState.SETTLED]
+    energy = _shared_out(open_ones, progress)
+    return tuple(
+        entry if entry.state is ChangeState.SETTLED else _one(entry, progress, energy[entry.entry])
+        for entry in entries
     )
+
+
+def _shared_out(entries: Sequence[Change], progress: Progress) -> dict[int, float]:
+    """W that each open entry has still to move, by its number.
+
+    What was owed for an entry that has been folded away is the next one's.
+    """
+    energy = {entry.entry: progress.unshot / len(entries) for entry in entries}
+    revisions = sorted({entry.revision for entry in entries})
+    for revision, owed in progress.owed.items():
+        later = revisions[min(bisect_left(revisions, revision), len(revisions) - 1)] if revisions else None
+        those = [entry for entry in entries if entry.revision == later]
+        for entry in those:
+            energy[entry.entry] += owed / len(those)
+    return energy
+
+
+def _one(entry: Change, progress: Progress, energy: float) -> Change:
+    shots = entry.shots + progress.shots
+    if progress.is_settled:
+        state, energy = ChangeState.SETTLED, 0.0
+    else:
+        state = ChangeState.REDISTRIBUTING if shots > 0 else ChangeState.PENDING
+    return replace(entry, state=state, energy_to_redistribute=energy, shots=shots)

@@ -51,7 +51,8 @@ from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
 from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
-from solver.types import LUMINANCE_WEIGHTS, FloatArray, Points
+from solver.redistribution.redistribution import Redistribution
+from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
 
 
 class Engine:
@@ -81,7 +82,8 @@ class Engine:
         self._history = History()
         self._log = ChangeLog()
         self._turn = 0
-        self._settle(World.of(scene), None)
+        self._moved: ObjectId | None = None
+        self._settle(World.of(scene), None, False)
 
     @property
     def scene(self) -> Scene:
@@ -134,7 +136,7 @@ class Engine:
             self._fine, self._gathers, self._instant = None, None, None
             self._turn += 1
         else:
-            self._settle(self._world, self._solution)
+            self._settle(self._world, self._solution, False)
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; False if nothing needed any.
@@ -228,6 +230,7 @@ class Engine:
 
     def overlay(self, request: OverlayRequest) -> Work:
         """Show an overlay that is ready, in slices of a few milliseconds. Raises as `Overlay.show`."""
+        self._solution.lend()
         return request.overlay.show(self._subject(request))
 
     def bake(self, request: LightmapRequest) -> Bake | None:
@@ -235,6 +238,7 @@ class Engine:
 
         An edit leaves it as it is, of the revision before. Raises NotReadyError where it never can be made.
         """
+        self._solution.lend()
         return begin_bake(request, self._revision, self._solution, self._fine_light(), self._settings)
 
     def _subject(self, request: OverlayRequest) -> Subject:
@@ -252,9 +256,9 @@ class Engine:
         self._frame_limits.check(camera, 1)
         return camera
 
-    def _settle(self, world: World, warm_start: Solution | None) -> None:
-        """Let light settle in `world`, anew or from `warm_start`."""
-        solution = Solution(world, self._settings, warm_start)
+    def _settle(self, world: World, earlier: Solution | None, drags: bool) -> None:
+        """Let light settle in `world`, anew or from what it was `earlier`."""
+        solution = Solution(world, self._settings, earlier, self._revision, drags)
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
         if self._instant is not None:
@@ -330,34 +334,47 @@ class Engine:
     def _take(self, step: Step) -> tuple[Change, ...]:
         """Go on in the scene that `step` leads to."""
         world = World.of(step.scene, self._world)
-        changes = self._changes(step, world)
-        self._log.add(changes, self._progress())
-        self._settle(world, self._solution)
+        before = self._progress()
         self._revision += 1
-        return changes
+        moved = _moved_alone(step)
+        self._settle(world, self._solution, drags=moved is not None and moved == self._moved)
+        self._moved = moved
+        changes = self._changes(step)
+        self._log.add(changes, before)
+        return self._log.entries(self._progress())[-len(changes) :]
 
     def _progress(self) -> Progress:
-        solver, statistics = self._solution.solver, self._solution.solver.statistics()
+        solution, solver = self._solution, self._solution.solver
+        statistics = solver.statistics()
+        owed = solver.owed() if isinstance(solver, Redistribution) else {}
         return Progress(
-            share_done=solver.progress,
-            shots=statistics.gathers * statistics.links,
-            is_settled=self._solution.state is SessionState.CONVERGED,
+            owed=owed,
+            unshot=solver.unshot_fraction * sum(solution.power_by_object().values()),
+            shots=solver.shots
+            if isinstance(solver, Redistribution)
+            else statistics.gathers * statistics.links,
+            is_settled=solution.state is SessionState.CONVERGED,
         )
 
-    def _changes(self, step: Step, after: World) -> tuple[Change, ...]:
-        power, emitted = self._solution.power_by_object(), after.emission_by_object()
+    def _changes(self, step: Step) -> tuple[Change, ...]:
         return tuple(
             Change(
                 entry=self._log.count + number,
-                revision=self._revision + 1,
+                revision=self._revision,
                 op=deed.op,
                 id=deed.object_id,
                 state=ChangeState.PENDING,
-                energy_to_redistribute=power.get(deed.object_id, emitted.get(deed.object_id, 0.0)),
+                energy_to_redistribute=0.0,
                 shots=0,
             )
             for number, deed in enumerate(step.deeds, 1)
         )
+
+
+def _moved_alone(step: Step) -> ObjectId | None:
+    """The object that `step` moves, if it does nothing else."""
+    deed = step.deeds[0] if len(step.deeds) == 1 else None
+    return deed.object_id if deed is not None and deed.op == "move" else None
 
 
 def _renderer_of(request: FrameRequest) -> RendererName:

@@ -12,6 +12,7 @@ from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.errors import SolverError
 from solver.geometry.surfaces import Surfaces
+from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -26,22 +27,48 @@ from all pairs: 2,000 patches of an office take 5 s, 3,000 15 s and 1.2 million 
 class Solution:
     """A solver, what it has come to, and the error that stopped it, if one did."""
 
-    def __init__(self, world: World, settings: SolverSettings, warm_start: Solution | None = None) -> None:
-        """Begin where `warm_start`, the solution of an earlier revision, has got to, unless it failed."""
+    def __init__(
+        self,
+        world: World,
+        settings: SolverSettings,
+        earlier: Solution | None = None,
+        number: int = 1,
+        drags: bool = False,
+    ) -> None:
+        """Go on from `earlier`, the solution of an earlier revision, which is used up, unless it failed.
+
+        `number` of the edit in between, which moves on what the one before moved, and nothing else, if it
+        `drags`.
+        """
         self.world = world
-        usable = warm_start is not None and warm_start.state is not SessionState.FAILED
-        earlier = warm_start.solver if warm_start is not None and usable else None
         self.solver: RadiositySolver | SampledSolver
         """Over links, or by samples where there are too many patches, which begins anew after every edit"""
-        if world.surfaces.patch_count > MOST_LINKED:
-            self.solver = SampledSolver(world.surfaces, world.rays, settings)
+        self._lent = False
+        surfaces, rays = world.surfaces, world.rays
+        before = None if earlier is None else earlier.handed_over()
+        if surfaces.patch_count > MOST_LINKED:
+            self.solver = SampledSolver(surfaces, rays, settings)
+        elif before is None:
+            self.solver = RadiositySolver(surfaces, rays, settings)
         else:
-            start = earlier if isinstance(earlier, RadiositySolver) else None
-            self.solver = RadiositySolver(world.surfaces, world.rays, settings, start)
+            self.solver = Redistribution(surfaces, rays, settings, before, number, drags)
         self._beyond_diffuse = _beyond_diffuse(world.surfaces, self.is_sampled)
         self._failure: SolverError | MemoryError | None = None
         self._field: RadiosityField | None = None
         self._field_version = -1
+
+    def lend(self) -> None:
+        """Let somebody read the solver's state for longer than the next edit may come."""
+        self._lent = True
+
+    def handed_over(self) -> RadiositySolver | None:
+        """The solver for the next revision to use up; None where there is nothing to go on from."""
+        solver = self.solver
+        if self._failure is not None or not isinstance(solver, RadiositySolver):
+            return None
+        if self._lent:
+            solver.keep_a_copy()
+        return solver
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; True while more work remains."""

@@ -84,8 +84,8 @@ class Change:
     """The object that changed."""
     state: ChangeState
     energy_to_redistribute: float
-    """W of luminance that the change takes away or brings, as far as the solution knew it: what the object
-    sent out before it, or, of an object that is added, what it emits."""
+    """W of luminance at stake: of links that have not been looked at since the change, were they open, and
+    its share of what is received but not propagated yet."""
     shots: int
     """Links over which the change has been shot so far."""
 

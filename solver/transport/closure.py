@@ -20,6 +20,7 @@ import numpy as np
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.transport.state import TransportState
+from solver.types import FloatArray, Int64Array
 from solver.visibility.rays import RayScene
 
 PROBES: Final = 16384
@@ -36,7 +37,12 @@ def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
     if surfaces.patch_count < 4:
         return False
     share = np.cumsum(surfaces.area) / surfaces.area.sum()
-    k = np.arange(PROBES)
+    # Open scenes are known by the first few, spread as all are.
+    return all(_all_end_on_fronts(surfaces, rays, share, np.arange(k, PROBES, 16)) for k in range(16))
+
+
+def _all_end_on_fronts(surfaces: Surfaces, rays: RayScene, share: FloatArray, k: Int64Array) -> bool:
+    """Whether the rays k (n,) of all `PROBES` end on fronts."""
     strata = (k + 0.5) / PROBES
     patch = np.minimum(np.searchsorted(share, strata), surfaces.patch_count - 1)
     # R4 sequence: point on the patch, direction of the ray.

@@ -9,12 +9,17 @@ axes of its patch. Hence its centroid, its second moments and its place in its p
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
 from solver.transport.subdivision import count_children, make_children, place_elements
 from solver.types import Corners, FloatArray, IntArray, Points
+
+_COPIED: Final = ("corners", "corner_count", "child_count", "area", "centroid", "moment", "offset")
+"""What a patch's elements keep when others come and go; the rest are numbers of patches and elements."""
 
 
 class ElementTree:
@@ -149,6 +154,31 @@ class ElementTree:
         self.child_count[ids] = counts
         make_children(ids, first, counts, self.corners, self.corner_count, self.patch, self.parent, self.area)
         self._place(len(self) - total)
+
+    @staticmethod
+    def carried(surfaces: Surfaces, earlier: ElementTree, patch: IntArray) -> tuple[ElementTree, IntArray]:
+        """The tree of new surfaces, with what the patches of an earlier tree that are still there had.
+
+        patch (p,) is the new number of each earlier patch, -1 where it is gone. Returns the same of each
+        earlier element (n,) too.
+        """
+        tree = ElementTree(surfaces)
+        before = earlier.patch_count
+        inner = np.flatnonzero(patch[earlier.patch[before:]] >= 0) + before
+        number = np.full(len(earlier), -1, dtype=np.int32)
+        number[:before] = patch
+        number[inner] = np.arange(len(inner), dtype=np.int32) + tree.patch_count
+        for name in _COPIED:
+            getattr(tree, f"_{name}").append(getattr(earlier, name)[inner])
+        tree._patch.append(patch[earlier.patch[inner]])
+        tree._parent.append(number[earlier.parent[inner]])
+        first = earlier.child[inner]
+        tree._child.append(np.where(first >= 0, number[first], -1))
+        stays = np.flatnonzero(patch >= 0)
+        first = earlier.child[stays]
+        tree.child[patch[stays]] = np.where(first >= 0, number[first], -1)
+        tree.child_count[patch[stays]] = earlier.child_count[stays]
+        return tree, number
 
     def _place(self, start: int) -> None:
         """Find centroids, moments and offsets of the elements from `start` on."""

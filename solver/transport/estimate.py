@@ -21,7 +21,7 @@ from solver.transport.oracle import (
 )
 from solver.transport.pushpull import pull
 from solver.transport.state import TransportState
-from solver.types import FloatArray
+from solver.types import FloatArray, IntArray
 
 LEAF: Final = 0.2
 """Part of the residuals within a leaf that counts as error: its mean is right all the same."""
@@ -41,6 +41,7 @@ class ErrorEstimate:
     irradiance: FloatArray
     """(n,) luminance irradiance, W/m2, by which a link errs at either end, at most"""
     light: Light
+    """of the elements"""
     norm: float
     """squared luminance of what is reflected, times area"""
 
@@ -52,43 +53,96 @@ class ErrorEstimate:
         return min(1.0, SAFETY * float(np.sqrt(self.links.sum() / self.norm)))
 
 
-def estimate_error(state: TransportState) -> ErrorEstimate:
-    """The error of the field as it stands.
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """What the errors of links depend on; luminance, n elements."""
 
-    Emission is known and would only dilute a relative error, so that the norm leaves it out.
-    """
-    tree, links = state.tree, state.links
-    luminance = state.radiosity @ state.weights
-    moments = np.empty((len(tree), 3, 1))
-    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, luminance[:, :, None], moments)
-    mean = np.maximum(moments[:, 0, 0], 0.0)
-    reflectance = (state.reflectance @ state.weights)[tree.patch]
-    amplitude, variance, spread, bias = np.empty((4, len(tree)))
-    arriving_amplitudes(links.p, links.q, links.residual_p, links.residual_q, reflectance, mean, amplitude)
-    leaf_residuals(tree.parent, tree.area, amplitude, variance)
-    element_residuals(
-        tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
-    )
-    leaving_bias(
-        links.p, links.q, links.residual_p, links.residual_q, tree.parent, tree.child, tree.child_count,
-        tree.area, reflectance, spread, bias,
-    )  # fmt: skip
-    leaf = tree.child < 0
-    resolved = np.where(leaf, LEAF, 1.0)
-    errors = np.empty((3, len(links)))
+    light: Light
+    spread: FloatArray
+    """(n,) RMS residual of the radiosity from its linear function, W/m2"""
+    amplitude: FloatArray
+    """(n,) sum over an element's own links of what they bring and its function leaves out, W/m2"""
+    bias: FloatArray
+    """(n,) error of the mean radiosity if the residuals of all sources err to one side, W/m2"""
 
-    def work(start: int, stop: int) -> None:
-        link_errors(
-            links.p, links.q, links.open_exchange, links.noise, links.residual_p, links.residual_q, tree.area,
-            reflectance, mean, spread, resolved, amplitude, bias, start, stop, errors[SPLIT_P],
-            errors[SPLIT_Q], errors[RESAMPLE],
+    @staticmethod
+    def of(state: TransportState) -> Residuals:
+        """As the light stands."""
+        tree, links = state.tree, state.links
+        luminance = state.radiosity @ state.weights
+        moments = np.empty((len(tree), 3, 1))
+        pull(
+            tree.child, tree.child_count, tree.area, tree.moment, tree.offset, luminance[:, :, None], moments
+        )
+        mean = np.maximum(moments[:, 0, 0], 0.0)
+        reflectance = (state.reflectance @ state.weights)[tree.patch]
+        amplitude, variance, spread, bias = np.empty((4, len(tree)))
+        arriving_amplitudes(
+            links.p, links.q, links.residual_p, links.residual_q, reflectance, mean, amplitude
+        )
+        leaf_residuals(tree.parent, tree.area, amplitude, variance)
+        element_residuals(
+            tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
+        )
+        leaving_bias(
+            links.p, links.q, links.residual_p, links.residual_q, tree.parent, tree.child, tree.child_count,
+            tree.area, reflectance, spread, bias,
         )  # fmt: skip
+        return Residuals(Light(mean, reflectance, 0.0), spread, amplitude, bias)
 
-    run_chunks(work, len(links), 1 << 15, 1 << 12)
-    reflected = luminance[leaf, 0] - (state.emission @ state.weights)[tree.patch[leaf]]
-    return ErrorEstimate(
-        links=errors,
-        irradiance=np.maximum(mean[links.q] * links.residual_p, mean[links.p] * links.residual_q),
-        light=Light(mean, reflectance, 0.0),
-        norm=float((tree.area[leaf] * reflected**2).sum()),
-    )
+    def grown(self, state: TransportState, fresh: IntArray) -> Residuals:
+        """As these, with elements that came since, when links `fresh` did.
+
+        They have their parents' residuals, but what arrives over their own links.
+        """
+        tree, links = state.tree, state.links
+        n = len(self.spread)
+        parent = tree.parent[n:]
+        arriving = np.zeros(len(tree))
+        reflectance = np.concatenate([self.light.reflectance, self.light.reflectance[parent]])
+        mean = np.concatenate([self.light.radiosity, np.maximum(state.radiosity[n:, 0] @ state.weights, 0.0)])
+        arriving_amplitudes(
+            links.p[fresh], links.q[fresh], links.residual_p[fresh], links.residual_q[fresh], reflectance,
+            mean, arriving,
+        )  # fmt: skip
+        return Residuals(
+            Light(mean, reflectance, 0.0),
+            np.concatenate([self.spread, self.spread[parent]]),
+            np.concatenate([self.amplitude, arriving[n:]]),
+            np.concatenate([self.bias, self.bias[parent]]),
+        )
+
+    def estimate(self, state: TransportState, rows: IntArray | slice = slice(None)) -> ErrorEstimate:
+        """The errors of the links `rows` (n,), or of all.
+
+        Emission is known and would only dilute a relative error, so that the norm leaves it out.
+        """
+        tree, links = state.tree, state.links
+        leaf = tree.child < 0
+        resolved = np.where(leaf, LEAF, 1.0)
+        p, q, exchange, noise = links.p[rows], links.q[rows], links.open_exchange[rows], links.noise[rows]
+        residual_p, residual_q = links.residual_p[rows], links.residual_q[rows]
+        errors = np.empty((3, len(p)))
+        mean, reflectance = self.light.radiosity, self.light.reflectance
+
+        def work(start: int, stop: int) -> None:
+            link_errors(
+                p, q, exchange, noise, residual_p, residual_q, tree.area, reflectance, mean, self.spread,
+                resolved, self.amplitude, self.bias, start, stop, errors[SPLIT_P], errors[SPLIT_Q],
+                errors[RESAMPLE],
+            )  # fmt: skip
+
+        run_chunks(work, len(p), 1 << 15, 1 << 12)
+        reflected = state.radiosity[leaf, 0] @ state.weights
+        reflected -= (state.emission @ state.weights)[tree.patch[leaf]]
+        return ErrorEstimate(
+            links=errors,
+            irradiance=np.maximum(mean[q] * residual_p, mean[p] * residual_q),
+            light=self.light,
+            norm=float((tree.area[leaf] * reflected**2).sum()),
+        )
+
+
+def estimate_error(state: TransportState) -> ErrorEstimate:
+    """The error of the field as it stands."""
+    return Residuals.of(state).estimate(state)

@@ -15,11 +15,11 @@ from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
-from solver.transport.links import LinkBatch, take_ranges
+from solver.transport.links import LinkBatch, LinkTable, take_ranges
 from solver.transport.oracle import samples_needed
 from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
 from solver.types import FloatArray, Int64Array, IntArray
-from solver.visibility.blockers import first_blockers
+from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
@@ -65,15 +65,21 @@ class Linker:
             exchange_tolerance,
         )
 
-    def facing_pairs(self, start: int, stop: int) -> tuple[IntArray, IntArray]:
-        """Pairs (p, q) of patches, p in [start, stop) and q > p, that have a part in front of each other."""
+    def facing_pairs(
+        self, members: IntArray, rank: IntArray, start: int, stop: int
+    ) -> tuple[IntArray, IntArray]:
+        """Pairs (p, q) of patches, p < q, that have a part in front of each other.
+
+        Of one of members[start:stop] and any patch whose `rank` (p,) is not less than its own; members are
+        ranked by their places.
+        """
         s = self.surfaces
         counts = np.zeros(stop - start, dtype=np.int64)
         empty = np.empty(0, dtype=np.int32)
 
         def count(a: int, b: int) -> None:
-            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
-                    counts, False, empty, empty)  # fmt: skip
+            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, members, rank, start,
+                    start + a, start + b, counts, False, empty, empty)  # fmt: skip
 
         run_chunks(count, stop - start, 64, 8)
         total = int(counts.sum())
@@ -81,14 +87,19 @@ class Linker:
         first = np.cumsum(counts) - counts
 
         def fill(a: int, b: int) -> None:
-            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, start, start + a, start + b,
-                    first, True, p, q)  # fmt: skip
+            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, members, rank, start,
+                    start + a, start + b, first, True, p, q)  # fmt: skip
 
         run_chunks(fill, stop - start, 64, 8)
         return p, q
 
-    def link_patches(self, tree: ElementTree, p: IntArray, q: IntArray, light: Light) -> LinkBatch:
-        """Links between patches."""
+    def link(
+        self, tree: ElementTree, p: IntArray, q: IntArray, light: Light, keep_dark: bool = False
+    ) -> LinkBatch:
+        """Links between elements p, q (n,) of which no blockers are known.
+
+        Pairs that cannot exchange light are left out, unless `keep_dark`.
+        """
         s, h = self.surfaces, self.hierarchy
         n = len(p)
         kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
@@ -100,8 +111,9 @@ class Linker:
             while at < stop:
                 pool = np.empty(room, dtype=np.int32)
                 used = first_blockers(
-                    p, q, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip, h.first,
-                    h.count, h.order, self.side_tolerance, at, stop, kind, kept, pool,
+                    p, q, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count, s.normal,
+                    h.low, h.high, h.skip, h.first, h.count, h.order, self.side_tolerance, at, stop, kind,
+                    kept, pool,
                 )  # fmt: skip
                 done = stop - at if used >= 0 else -1 - used
                 length = int(kept[at : at + done].sum())
@@ -111,7 +123,43 @@ class Linker:
 
         run_chunks(work, n, _CHUNK, _LEAST)
         pool = np.concatenate([piece for start in sorted(lists) for piece in lists[start]] or [kept[:0]])
-        return self._evaluate(tree, p, q, kind, kept, pool, np.ones(n, dtype=np.int32), light)
+        return self._evaluate(tree, p, q, kind, kept, pool, np.ones(n, dtype=np.int32), light, keep_dark)
+
+    def renew(
+        self, tree: ElementTree, links: LinkTable, rows: IntArray, recent: Hierarchy, light: Light
+    ) -> tuple[IntArray, LinkBatch]:
+        """Links of `rows` (n,) as they are now that patches have come and gone.
+
+        recent: of the patches that came; those that went are -1 among the blockers. Returns the rows (m,)
+        that are different, and what they are now.
+        """
+        s, h = self.surfaces, recent
+        p, q = links.p[rows], links.q[rows]
+        before, listed, first = links.kind[rows], links.blocker_count[rows], links.blocker_start[rows]
+        n = len(rows)
+        kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        most = listed.astype(np.int64) + len(h.order)
+        room = np.cumsum(most) - most
+        loose = np.empty(int(most.sum()), dtype=np.int32)
+
+        def work(start: int, stop: int) -> None:
+            renewed_blockers(
+                p, q, before, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count,
+                s.normal, h.low, h.high, h.skip, h.first, h.count, h.order, self.side_tolerance, first,
+                listed, links.pool, start, stop, room, kind, kept, loose,
+            )  # fmt: skip
+
+        run_chunks(work, n, _CHUNK, _LEAST)
+        known = np.flatnonzero(kind <= NONE)
+        pool = take_ranges(loose, room[known], kept[known])
+        least = np.ones(len(known), dtype=np.int32)
+        batches = [
+            self._evaluate(tree, p[known], q[known], kind[known], kept[known], pool, least, light, True)
+        ]
+        unknown = np.flatnonzero(kind == UNKNOWN)
+        if len(unknown):
+            batches.append(self.link(tree, p[unknown], q[unknown], light, keep_dark=True))
+        return rows[np.concatenate([known, unknown])], LinkBatch.joined(batches)
 
     def link_children(
         self,
@@ -151,6 +199,7 @@ class Linker:
         pool: IntArray,
         least_samples: IntArray,
         light: Light,
+        keep_dark: bool = False,
     ) -> LinkBatch:
         n = len(p)
         open_exchange = np.zeros(n)
@@ -193,7 +242,7 @@ class Linker:
         slope = np.empty((2, n, 2))
         for end, element in enumerate((p, q)):
             find_slopes(tree.moment, element, open_exchange, position[end], slope[end])
-        alive = (open_exchange > 0.0) | (kind == NONE)
+        alive = (open_exchange > 0.0) | (kind == NONE) | keep_dark
         ends = np.cumsum(kept, dtype=np.int64)
         return LinkBatch(
             p=p[alive],

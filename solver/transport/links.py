@@ -14,10 +14,14 @@ import numpy as np
 
 from solver.arrays import GrowingArray
 from solver.kernels import kernel
-from solver.types import BoolArray, FloatArray, Int64Array, IntArray
+from solver.parallel import run_chunks
+from solver.types import FloatArray, Int64Array, IntArray
 
 _POOLED: Final = 1 << 21
 """Entries of blocker lists copied between two yields."""
+
+_LEAST_POOL: Final = 1 << 16
+"""Entries of blocker lists below which tidying is not worth it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +55,24 @@ class LinkBatch:
     blockers: IntArray
     """all lists, one after the other: patches"""
 
+    @staticmethod
+    def joined(batches: Sequence[LinkBatch]) -> LinkBatch:
+        """One batch of all rows."""
+        if len(batches) == 1:
+            return batches[0]
+        return LinkBatch(
+            **{
+                column.name: np.concatenate([getattr(batch, column.name) for batch in batches])
+                for column in fields(LinkBatch)
+            }
+        )
+
 
 _COLUMNS: Final = tuple(column.name for column in fields(LinkBatch) if column.name != "blockers")
 """Names of what the table holds a row of for each link, as in `LinkBatch`."""
+
+_OWN: Final = (*_COLUMNS, "blocker_start", "debt")
+"""All that there is of a link but its blockers."""
 
 
 class LinkTable:
@@ -74,6 +93,7 @@ class LinkTable:
         self._residual_q = GrowingArray((), np.float64, capacity)
         self._blocker_count = GrowingArray((), np.int32, capacity)
         self._blocker_start = GrowingArray((), np.int64, capacity)
+        self._debt = GrowingArray((), np.int32, capacity)
         self._pool = GrowingArray((), np.int32, capacity)
 
     def __len__(self) -> int:
@@ -150,6 +170,11 @@ class LinkTable:
         return self._blocker_count.live
 
     @property
+    def debt(self) -> IntArray:
+        """(n,) 0, or the number of the change of geometry that this link does not know of yet"""
+        return self._debt.live
+
+    @property
     def pool(self) -> IntArray:
         """All blocker lists: patches"""
         return self._pool.live
@@ -158,7 +183,8 @@ class LinkTable:
     def nbytes(self) -> int:
         """Bytes held."""
         columns: list[GrowingArray[Any]] = [getattr(self, f"_{name}") for name in _COLUMNS]
-        return self._pool.nbytes + self._blocker_start.nbytes + sum(column.nbytes for column in columns)
+        columns += [self._pool, self._blocker_start, self._debt]
+        return sum(column.nbytes for column in columns)
 
     def append(self, batch: LinkBatch) -> None:
         """Take evaluated links in."""
@@ -166,38 +192,107 @@ class LinkTable:
         for name in _COLUMNS:
             getattr(self, f"_{name}").append(getattr(batch, name))
         self._blocker_start.append(start)
+        self._debt.grow(len(start))
         self._pool.append(batch.blockers)
 
-    def replace(self, gone: BoolArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
-        """Put links in the place of those where `gone` (n,) is true; yields every few milliseconds.
-
-        The table changes in one go, after the last yield.
-        """
-        kept = np.flatnonzero(~gone)
-        rows = len(kept) + sum(len(batch.p) for batch in batches)
-        fresh = LinkTable(rows)
+    def overwrite(self, rows: IntArray, batch: LinkBatch) -> None:
+        """Put the links of `batch` in the place of `rows` (n,), one for one."""
+        start = len(self._pool) + np.cumsum(batch.blocker_count, dtype=np.int64) - batch.blocker_count
         for name in _COLUMNS:
-            column: GrowingArray[Any] = getattr(fresh, f"_{name}")
-            column.append(getattr(self, name)[kept])
-            for batch in batches:
-                column.append(getattr(batch, name))
+            getattr(self, name)[rows] = getattr(batch, name)
+        self.blocker_start[rows] = start
+        self.debt[rows] = 0
+        self._pool.append(batch.blockers)
+
+    def replace(self, gone: IntArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
+        """Put links in the place of the rows `gone` (n,), ascending; yields every few milliseconds.
+
+        The table changes in one go, after the last yield but those that tidy up. Rows that stay keep their
+        places where as many come as go; else the last ones fill the places that are left.
+        """
+        fresh = {}
+        for name in _COLUMNS:
+            fresh[name] = np.concatenate(
+                [getattr(self, name)[:0], *(getattr(batch, name) for batch in batches)]
+            )
+        blockers = np.concatenate([self.pool[:0], *(batch.blockers for batch in batches)])
+        yield
+        count = fresh["blocker_count"]
+        start = len(self._pool) + np.cumsum(count, dtype=np.int64) - count
+        filled = min(len(gone), len(count))
+        for name, column in (*fresh.items(), ("blocker_start", start), ("debt", np.zeros_like(count))):
+            getattr(self, name)[gone[:filled]] = column[:filled]
+            getattr(self, f"_{name}").append(column[filled:])
+        self._pool.append(blockers)
+        self._fill(gone[filled:])
+        yield
+        yield from self._tidy(2.0)
+
+    def trim(self) -> Iterator[None]:
+        """Give back what is held beyond the links themselves; yields every few milliseconds."""
+        yield from self._tidy(1.0)
+        for name in (*_OWN, "pool"):
+            getattr(self, f"_{name}").trim()
             yield
-        count = fresh.blocker_count
+
+    def renumber(self, element: IntArray, patch: IntArray) -> None:
+        """Elements and patches get the numbers `element` and `patch` of those that they had; none below 0."""
+        self.p[:] = element[self.p]
+        self.q[:] = element[self.q]
+        known = patch >= 0
+        if not np.array_equal(patch[known], np.flatnonzero(known)):
+            pool = self.pool
+            run_chunks(lambda start, stop: _renumber(pool, patch, start, stop), len(pool), 1 << 18)
+
+    def forget(self, rows: IntArray, patch: IntArray) -> None:
+        """Put -1 in the place of blockers of `rows` that have no new number in `patch` (p,)."""
+        _forget(self.pool, self.blocker_start[rows], self.blocker_count[rows], patch)
+
+    def remove(self, gone: IntArray) -> None:
+        """Take out the rows `gone` (n,), ascending. The last ones fill their places."""
+        self._fill(gone)
+
+    def take(self, rows: IntArray) -> LinkBatch:
+        """Copies of `rows` (n,)."""
+        return LinkBatch(
+            **{name: getattr(self, name)[rows] for name in _COLUMNS},
+            blockers=take_ranges(self.pool, self.blocker_start[rows], self.blocker_count[rows]),
+        )
+
+    def copy(self) -> LinkTable:
+        """The same links in arrays of their own."""
+        other = LinkTable(len(self))
+        for name in (*_OWN, "pool"):
+            getattr(other, f"_{name}").append(getattr(self, name))
+        return other
+
+    def _fill(self, holes: IntArray) -> None:
+        left = len(self) - len(holes)
+        inside = holes[holes < left]
+        moved = np.ones(len(self) - left, dtype=np.bool_)
+        moved[holes[len(inside) :] - left] = False
+        last = left + np.flatnonzero(moved)
+        for name in _OWN:
+            column = getattr(self, name)
+            column[inside] = column[last]
+            getattr(self, f"_{name}").truncate(left)
+
+    def _tidy(self, slack: float) -> Iterator[None]:
+        """Drop what no link needs from `pool`, where it holds more than `slack` of what they need."""
+        count = self.blocker_count
+        needed = int(count.sum(dtype=np.int64))
+        if len(self._pool) <= max(slack * needed, (slack - 1.0) * _LEAST_POOL):
+            return
         start = np.cumsum(count, dtype=np.int64) - count
-        fresh._blocker_start.append(start)
-        pool = GrowingArray((), np.int32, int(count.sum()))
+        pool = GrowingArray((), np.int32, int((0.5 + 0.5 * slack) * needed) + needed // 16)
         at = 0
-        while at < len(kept):
-            stop = max(at + 1, int(np.searchsorted(start[: len(kept)], start[at] + _POOLED, side="right")))
-            part = kept[at:stop]
-            pool.append(take_ranges(self.pool, self.blocker_start[part], self.blocker_count[part]))
+        while at < len(count):
+            stop = max(at + 1, int(np.searchsorted(start, start[at] + _POOLED, side="right")))
+            pool.append(take_ranges(self.pool, self.blocker_start[at:stop], count[at:stop]))
             at = stop
             yield
-        for batch in batches:
-            pool.append(batch.blockers)
-            yield
-        fresh._pool = pool
-        self.__dict__.update(fresh.__dict__)
+        self._pool = pool
+        self.blocker_start[:] = start
 
 
 @kernel
@@ -213,3 +308,18 @@ def take_ranges(values: IntArray, start: Int64Array, count: IntArray) -> IntArra
             out[at] = values[i]
             at += 1
     return out
+
+
+@kernel
+def _forget(pool: IntArray, start: Int64Array, count: IntArray, patch: IntArray) -> None:
+    for k in range(len(start)):
+        for i in range(start[k], start[k] + count[k]):
+            if pool[i] >= 0 and patch[pool[i]] < 0:
+                pool[i] = -1
+
+
+@kernel
+def _renumber(pool: IntArray, patch: IntArray, start: int, stop: int) -> None:
+    for i in range(start, stop):
+        if pool[i] >= 0:
+            pool[i] = patch[pool[i]]

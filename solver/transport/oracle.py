@@ -27,7 +27,7 @@ import numpy as np
 
 from solver.kernels import kernel
 from solver.transport.variation import solve_moment
-from solver.types import FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.fraction import STRATIFIED
 
 SPLIT_P: Final = 0
@@ -222,6 +222,46 @@ def samples_needed(
         while samples < MAX_SAMPLES and 0.25 * STRATIFIED * weight > limit * 16.0 * samples:
             samples *= 4
         out[link] = samples
+
+
+@kernel
+def best_remedies(
+    p: IntArray,
+    q: IntArray,
+    samples: IntArray,
+    splittable: BoolArray,
+    irradiance: FloatArray,
+    limit: float,
+    errors: FloatArray,
+    worth: FloatArray,
+    action: IntArray,
+) -> float:
+    """The greatest of each link's `errors` (3, n) that can be resolved, and how; returns the sum left alone.
+
+    Elements may be `splittable` (m,); links that err by no more than `limit` W/m2 (n,) are not split.
+    """
+    left_alone = 0.0
+    for link in range(len(p)):
+        split_p = errors[SPLIT_P, link]
+        split_q = errors[SPLIT_Q, link]
+        if irradiance[link] <= limit:
+            left_alone += split_p + split_q
+            split_p = 0.0
+            split_q = 0.0
+        if not splittable[p[link]]:
+            split_p = 0.0
+        if not splittable[q[link]]:
+            split_q = 0.0
+        best = split_p
+        action[link] = SPLIT_P
+        if split_q > best:
+            best = split_q
+            action[link] = SPLIT_Q
+        if errors[RESAMPLE, link] > best and samples[link] < MAX_SAMPLES:
+            best = errors[RESAMPLE, link]
+            action[link] = RESAMPLE
+        worth[link] = best
+    return left_alone
 
 
 @kernel

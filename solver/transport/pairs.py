@@ -19,6 +19,8 @@ def list_facing(
     counts: IntArray,
     normals: FloatArray,
     tolerance: float,
+    members: IntArray,
+    rank: IntArray,
     base: int,
     start: int,
     stop: int,
@@ -27,10 +29,17 @@ def list_facing(
     out_p: IntArray,
     out_q: IntArray,
 ) -> None:
-    """Count, or write from slot[p - base], the patches q > p that p in [start, stop) faces."""
-    for p in range(start, stop):
+    """Count, or write from slot[k - base], the patches that members[k], k in [start, stop), faces.
+
+    Those of less than its own `rank` (p,) are left out, so that members that are ranked by their places are
+    paired once.
+    """
+    for k in range(start, stop):
+        p = members[k]
         found = 0
-        for q in range(p + 1, len(corners)):
+        for q in range(len(corners)):
+            if q == p or rank[q] < rank[p]:
+                continue
             _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
             if high <= tolerance:
                 continue
@@ -38,11 +47,11 @@ def list_facing(
             if high <= tolerance:
                 continue
             if write:
-                out_p[slot[p - base] + found] = p
-                out_q[slot[p - base] + found] = q
+                out_p[slot[k - base] + found] = min(p, q)
+                out_q[slot[k - base] + found] = max(p, q)
             found += 1
         if not write:
-            slot[p - base] = found
+            slot[k - base] = found
 
 
 @kernel

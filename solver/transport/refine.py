@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,11 +11,11 @@ import numpy as np
 from solver.transport.estimate import ErrorEstimate
 from solver.transport.field import SolveOutcome
 from solver.transport.linking import Light, Linker
-from solver.transport.oracle import MAX_SAMPLES, RESAMPLE, SPLIT_P, SPLIT_Q, child_pairs, threshold_for_share
+from solver.transport.oracle import RESAMPLE, SPLIT_P, best_remedies, child_pairs, threshold_for_share
 from solver.transport.pace import Pace
 from solver.transport.settings import SolverSettings
 from solver.transport.state import TransportState
-from solver.types import BoolArray, IntArray
+from solver.types import FloatArray, IntArray
 
 NOISE_SHARE: Final = 4.0
 """Noise that fresh links may have, of the least error that is refined in the same round."""
@@ -40,35 +40,68 @@ def choose(
     state: TransportState, estimate: ErrorEstimate, settings: SolverSettings, resolve: float
 ) -> Choice | SolveOutcome:
     """The worst links, until `resolve` of the squared error is dealt with; or why nothing can be done."""
-    links = state.links
-    errors = estimate.links
-    left_alone = 0.0
-    if settings.transport_error is not None:
-        small = estimate.irradiance <= settings.transport_error
-        left_alone = float(errors[:2, small].sum())
-        errors[:2, small] = 0.0
-    errors[SPLIT_P, ~_splittable(state, settings, links.p)] = 0.0
-    errors[SPLIT_Q, ~_splittable(state, settings, links.q)] = 0.0
-    errors[RESAMPLE, links.samples >= MAX_SAMPLES] = 0.0
-    action = np.argmax(errors, axis=0).astype(np.int32)
-    worth = errors.max(axis=0)
+    worth, action, left_alone = _worths(state, estimate, settings)
     total = float(worth.sum())
     if total <= 1e-3 * resolve:
         return SolveOutcome.TRANSPORT_ERROR if left_alone > 1e-3 * resolve else SolveOutcome.MINIMUM_AREA
     bound = threshold_for_share(worth, min(resolve, 0.9 * total))
-    chosen = np.flatnonzero(worth >= bound)
+    chosen = np.flatnonzero(worth >= bound).astype(np.int32)
+    return _within_limits(state, settings, chosen, action[chosen], bound)
+
+
+def choose_above(
+    state: TransportState, rows: IntArray, estimate: ErrorEstimate, settings: SolverSettings, bound: float
+) -> Choice | SolveOutcome | None:
+    """Those of the links `rows`, whose estimate it is, with a squared error above `bound`; None for none."""
+    worth, action, _ = _worths(state, estimate, settings, rows)
+    worst = np.flatnonzero(worth > bound)
+    if len(worst) == 0:
+        return None
+    return _within_limits(state, settings, rows[worst], action[worst], bound)
+
+
+def _worths(
+    state: TransportState,
+    estimate: ErrorEstimate,
+    settings: SolverSettings,
+    rows: IntArray | slice = slice(None),
+) -> tuple[FloatArray, IntArray, float]:
+    """What the best remedy of each link (n,) resolves, which it is, and the error that is left alone."""
+    tree, links = state.tree, state.links
+    minimum = settings.minimum_area
+    if minimum is None:
+        minimum = DEFAULT_MINIMUM_AREA * state.surfaces.size**2
+    splittable = (tree.child >= 0) | (tree.area >= 4.0 * minimum)
+    limit = -1.0 if settings.transport_error is None else settings.transport_error
+    p, q, samples = links.p[rows], links.q[rows], links.samples[rows]
+    worth, action = np.empty(len(p)), np.empty(len(p), dtype=np.int32)
+    left_alone = best_remedies(
+        p, q, samples, splittable, estimate.irradiance, limit, estimate.links, worth, action
+    )
+    return worth, action, left_alone
+
+
+def _within_limits(
+    state: TransportState, settings: SolverSettings, chosen: IntArray, action: IntArray, bound: float
+) -> Choice | SolveOutcome:
+    """The choice of links (m,) and of what to do with each, unless there would be too many then."""
+    links, tree = state.links, state.tree
     if len(links) + 3 * len(chosen) > settings.max_links:
         return SolveOutcome.LINK_LIMIT
-    action = action[chosen]
     split = np.where(action == SPLIT_P, links.p[chosen], links.q[chosen])
     ends = np.unique(split[action != RESAMPLE])
-    if len(state.tree) + 4 * int((state.tree.child[ends] < 0).sum()) > settings.max_elements:
+    if len(tree) + 4 * int((tree.child[ends] < 0).sum()) > settings.max_elements:
         return SolveOutcome.ELEMENT_LIMIT
-    return Choice(chosen.astype(np.int32), action, bound)
+    return Choice(chosen, action, bound)
 
 
-def refine(state: TransportState, linker: Linker, pace: Pace, light: Light, choice: Choice) -> Iterator[int]:
-    """Replace the chosen links by better ones; yields the rays that each slice of it took, / 16."""
+def refine(
+    state: TransportState, linker: Linker, pace: Pace, light: Light, choice: Choice
+) -> Generator[int, None, IntArray]:
+    """Replace the chosen links by better ones; yields the rays that each slice of it took, / 16.
+
+    Returns the rows of the better ones.
+    """
     tree, links = state.tree, state.links
     chosen, action = choice.links, choice.action
     p, q, samples = links.p[chosen], links.q[chosen], links.samples[chosen]
@@ -98,15 +131,8 @@ def refine(state: TransportState, linker: Linker, pace: Pace, light: Light, choi
         )
         batches.append(batch)
         yield int(batch.samples.sum())
-    gone = np.zeros(len(links), dtype=bool)
-    gone[chosen] = True
-    for _ in links.replace(gone, batches):
+    before = len(links)
+    for _ in links.replace(chosen, batches):
         yield 0
-
-
-def _splittable(state: TransportState, settings: SolverSettings, elements: IntArray) -> BoolArray:
-    tree = state.tree
-    minimum = settings.minimum_area
-    if minimum is None:
-        minimum = DEFAULT_MINIMUM_AREA * state.surfaces.size**2
-    return np.asarray((tree.child[elements] >= 0) | (tree.area[elements] >= 4.0 * minimum))
+    filled = chosen[: sum(len(batch.p) for batch in batches)]
+    return np.concatenate([filled, np.arange(before, len(links), dtype=np.int32)])

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from solver.kernels import kernel
 from solver.transport.state import TransportState
-from solver.types import FloatArray
+from solver.types import FloatArray, IntArray, Spectra
 
 MOST_STEPS: Final = 500
 
@@ -27,51 +28,152 @@ def settle(state: TransportState, target: float) -> Generator[float | None, None
     links in error let light multiply.
     """
     tree = state.tree
-    leaf = tree.child < 0
-    reflectance = np.where(leaf[:, None], state.reflectance[tree.patch], 0.0)[:, None]
-    emission = np.zeros_like(state.radiosity)
-    emission[:, 0] = state.emission[tree.patch]
-    area = np.where(leaf, tree.area, 0.0)
-    active = np.broadcast_to(reflectance > 0.0, emission.shape)
-    weight = np.where(
-        reflectance > 0.0, area[:, None, None] / np.where(reflectance > 0.0, reflectance, 1.0), 0.0
-    )
-    state.radiosity[~active] = emission[~active]
+    leaves = tree.leaves
+    patch, emission, reflectance = tree.patch, state.emission, state.reflectance
     state.received = yield from state.gather_in_steps(state.radiosity)
-    unshot = np.where(active, emission + reflectance * state.received - state.radiosity, 0.0)
+    unshot = np.zeros_like(state.radiosity)
+    moment, area = tree.moment, tree.area
+    _find_unshot(leaves, patch, emission, reflectance, state.radiosity, state.received, unshot)
     direction = unshot.copy()
-    energy = _inner(tree.moment, weight, unshot, unshot)
-    one = area[:, None, None]
+    energy = np.zeros(state.channels)
+    _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
     for _ in range(MOST_STEPS):
-        reflected = state.radiosity - emission
-        scale = np.sqrt(_inner(tree.moment, one, reflected, reflected).sum())
-        left = np.sqrt(_inner(tree.moment, one, unshot, unshot).sum())
-        held = float((area[:, None] * np.abs(state.radiosity[:, 0])).sum())
-        yield float((area[:, None] * np.abs(unshot[:, 0])).sum()) / max(held, 1e-300)
-        if left <= target * scale:
+        held, left, scale, unsent = _measure(
+            leaves, patch, area, moment, emission, state.radiosity, unshot
+        )  # fmt: skip
+        yield unsent / max(held, 1e-300)
+        if np.sqrt(left) <= target * np.sqrt(scale):
             return True
-        arrived = yield from state.gather_in_steps(direction)
+        moved = yield from state.gather_in_steps(direction)
+        arrived = moved.copy()
         yield None
-        moved = np.where(active, direction - reflectance * arrived, 0.0)
-        curvature = _inner(tree.moment, weight, direction, moved)
+        _subtract_from(leaves, patch, reflectance, direction, moved)
+        curvature = np.zeros(state.channels)
+        _weigh(leaves, patch, area, moment, reflectance, direction, moved, curvature)
         if np.any((curvature <= 0.0) & (energy > 0.0)):
             return False
         length = _ratio(energy, curvature)
-        state.radiosity += length * direction
-        state.received += length * arrived
-        unshot -= length * moved
-        before, energy = energy, _inner(tree.moment, weight, unshot, unshot)
-        direction = unshot + _ratio(energy, before) * direction
+        _advance(length, direction, state.radiosity)
+        _advance(length, arrived, state.received)
+        _advance(-length, moved, unshot)
+        before, energy = energy, np.zeros(state.channels)
+        _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
+        _turn(_ratio(energy, before), unshot, direction)
     return False
-
-
-def _inner(moment: FloatArray, weight: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Weighted inner product (channels,) of functions (n, 3, channels) over the elements."""
-    uu, uv, vv = (moment[:, k, None] for k in range(3))
-    along = uu * b[:, 1] + uv * b[:, 2]
-    across = uv * b[:, 1] + vv * b[:, 2]
-    return np.asarray((weight[:, 0] * (a[:, 0] * b[:, 0] + a[:, 1] * along + a[:, 2] * across)).sum(axis=0))
 
 
 def _ratio(above: FloatArray, below: FloatArray) -> FloatArray:
     return np.where(below > 0.0, above / np.where(below > 0.0, below, 1.0), 0.0)
+
+
+@kernel
+def _find_unshot(
+    leaves: IntArray,
+    patch: IntArray,
+    emission: Spectra,
+    reflectance: Spectra,
+    radiosity: FloatArray,
+    received: FloatArray,
+    unshot: FloatArray,
+) -> None:
+    """What a gather would add to each leaf; leaves that reflect nothing hold what they emit."""
+    for e in leaves:
+        p = patch[e]
+        for c in range(radiosity.shape[2]):
+            if reflectance[p, c] > 0.0:
+                unshot[e, 0, c] = emission[p, c] + reflectance[p, c] * received[e, 0, c] - radiosity[e, 0, c]
+                for k in range(1, 3):
+                    unshot[e, k, c] = reflectance[p, c] * received[e, k, c] - radiosity[e, k, c]
+            else:
+                radiosity[e, 0, c] = emission[p, c]
+                radiosity[e, 1, c] = 0.0
+                radiosity[e, 2, c] = 0.0
+
+
+@kernel
+def _subtract_from(
+    leaves: IntArray, patch: IntArray, reflectance: Spectra, direction: FloatArray, arrived: FloatArray
+) -> None:
+    """Make direction - reflectance * arrived of `arrived`, 0 where nothing is reflected."""
+    inner = np.ones(len(arrived), dtype=np.bool_)
+    for e in leaves:
+        inner[e] = False
+        p = patch[e]
+        for c in range(arrived.shape[2]):
+            rho = reflectance[p, c]
+            for k in range(3):
+                arrived[e, k, c] = direction[e, k, c] - rho * arrived[e, k, c] if rho > 0.0 else 0.0
+    for e in range(len(inner)):
+        if inner[e]:
+            arrived[e] = 0.0
+
+
+@kernel
+def _advance(length: FloatArray, step: FloatArray, functions: FloatArray) -> None:
+    for e in range(len(functions)):
+        for k in range(3):
+            for c in range(len(length)):
+                functions[e, k, c] += length[c] * step[e, k, c]
+
+
+@kernel
+def _turn(share: FloatArray, unshot: FloatArray, direction: FloatArray) -> None:
+    for e in range(len(unshot)):
+        for k in range(3):
+            for c in range(len(share)):
+                direction[e, k, c] = unshot[e, k, c] + share[c] * direction[e, k, c]
+
+
+@kernel
+def _product(moment: FloatArray, a: FloatArray, b: FloatArray, e: int, c: int) -> float:
+    """Mean over an element of the product of two linear functions."""
+    along = moment[e, 0] * b[e, 1, c] + moment[e, 1] * b[e, 2, c]
+    across = moment[e, 1] * b[e, 1, c] + moment[e, 2] * b[e, 2, c]
+    product: float = a[e, 0, c] * b[e, 0, c] + a[e, 1, c] * along + a[e, 2, c] * across
+    return product
+
+
+@kernel
+def _weigh(
+    leaves: IntArray,
+    patch: IntArray,
+    area: FloatArray,
+    moment: FloatArray,
+    reflectance: Spectra,
+    a: FloatArray,
+    b: FloatArray,
+    total: FloatArray,
+) -> None:
+    """Add to `total` (channels,) the inner products over the leaves, weighted by area over reflectance."""
+    for e in leaves:
+        for c in range(len(total)):
+            rho = reflectance[patch[e], c]
+            if rho > 0.0:
+                total[c] += area[e] / rho * _product(moment, a, b, e, c)
+
+
+@kernel
+def _measure(
+    leaves: IntArray,
+    patch: IntArray,
+    area: FloatArray,
+    moment: FloatArray,
+    emission: Spectra,
+    radiosity: FloatArray,
+    unshot: FloatArray,
+) -> tuple[float, float, float, float]:
+    """W that are held; squares, times area, of what is unshot and of what is reflected; W that are unshot."""
+    held = 0.0
+    left = 0.0
+    scale = 0.0
+    unsent = 0.0
+    for e in leaves:
+        for c in range(radiosity.shape[2]):
+            held += area[e] * abs(radiosity[e, 0, c])
+            unsent += area[e] * abs(unshot[e, 0, c])
+            left += area[e] * _product(moment, unshot, unshot, e, c)
+            emitted = emission[patch[e], c]
+            reflected = radiosity[e, 0, c] - emitted
+            square = _product(moment, radiosity, radiosity, e, c)
+            scale += area[e] * (square - radiosity[e, 0, c] ** 2 + reflected * reflected)
+    return held, left, scale, unsent

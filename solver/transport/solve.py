@@ -10,7 +10,7 @@ Work is a generator that yields about every few milliseconds, so that `step` can
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -21,13 +21,12 @@ from solver.transport.estimate import estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light, Linker
 from solver.transport.pace import Pace
-from solver.transport.pushpull import means
-from solver.transport.refine import choose, refine
+from solver.transport.refine import Choice, choose, refine
 from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.sliced import SlicedSolve
 from solver.transport.state import TransportState
-from solver.types import Spectra
+from solver.types import IntArray, Spectra
 from solver.visibility.bvh import Hierarchy
 from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
@@ -81,23 +80,21 @@ class RadiositySolver(SlicedSolve):
         surfaces: Surfaces,
         rays: RayScene,
         settings: SolverSettings,
-        warm_start: RadiositySolver | None = None,
     ) -> None:
-        """Set up the patches as the first elements; no light is moved yet.
-
-        `warm_start`: a solution of an earlier revision, whose mean radiosities of patches that still
-        exist are where this one starts from.
-        """
+        """Set up the patches as the first elements; no light is moved yet."""
         super().__init__(surfaces, settings)
         self._rays = rays
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
         self._pace = Pace()
         self._state = TransportState.of(surfaces)
         self._closed = False
-        if warm_start is not None:
-            self._adopt(warm_start)
         self._ray_count = 0
         self._rounds = 0
+        self._handed: TransportState | None = None
+        self.linked = 0
+        """Patches that are linked with all that come after them"""
+        self.bound = 0.0
+        """Least squared error of a link that the last round of refinement dealt with"""
 
     @property
     def state(self) -> TransportState:
@@ -108,6 +105,14 @@ class RadiositySolver(SlicedSolve):
     def hierarchy(self) -> Hierarchy:
         """Of the patches that block."""
         return self._linker.hierarchy
+
+    def hand_over(self) -> TransportState:
+        """The state, for somebody else to change; what this solver has is then no longer of use."""
+        return self._state if self._handed is None else self._handed
+
+    def keep_a_copy(self) -> None:
+        """Let those that read the state keep it as it is: what is handed over is another one."""
+        self._handed = replace(self._state, links=self._state.links.copy())
 
     def statistics(self) -> SolverStatistics:
         """Counts at this moment."""
@@ -150,21 +155,14 @@ class RadiositySolver(SlicedSolve):
     def _to_rgb(self, spectra: Spectra) -> Spectra:
         return np.repeat(spectra, 3, axis=1) if self._state.channels == 1 else spectra.copy()
 
-    def _adopt(self, earlier: RadiositySolver) -> None:
-        old = {key: n for n, key in enumerate(_patch_keys(earlier.surfaces))}
-        match = np.array([old.get(key, -1) for key in _patch_keys(self.surfaces)], dtype=np.int64)
-        known = match >= 0
-        state = self._state
-        received = means(earlier._state.tree, earlier._state.received)[match[known]]
-        if received.shape[1] != state.channels:
-            received = np.repeat(received[:, :1], state.channels, axis=1)
-        state.received[known, 0] = received
-        state.radiosity[known, 0] += state.reflectance[known] * received
-
     # --- the work, in slices -------------------------------------------------------------------------
 
-    def _run(self) -> Iterator[bool]:
+    def _open(self) -> Iterator[bool]:
+        """Bring about links between all patches that exchange light; sets `outcome` where that fails."""
         yield from self._link_patches()
+
+    def _run(self) -> Iterator[bool]:
+        yield from self._open()
         if self.outcome is not SolveOutcome.RUNNING:
             return
         self._closed = is_closed(self.surfaces, self._rays)
@@ -187,6 +185,8 @@ class RadiositySolver(SlicedSolve):
             self._report_progress()
             yield True
             if estimate.relative <= tolerance:
+                for _ in state.links.trim():
+                    yield True
                 if self.error_estimate > tolerance:
                     self.outcome = SolveOutcome.RELATIVE_CUTOFF
                 return
@@ -196,12 +196,22 @@ class RadiositySolver(SlicedSolve):
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
                 return
+            self.bound = choice.bound
             yield True
-            for number, samples in enumerate(refine(state, self._linker, self._pace, estimate.light, choice)):
-                # The leaves are others from the first slice on.
-                self.version += number == 0
-                self._ray_count += STRATA * samples
-                yield True
+            yield from self._refine(estimate.light, choice)
+
+    def _refine(self, light: Light, choice: Choice) -> Generator[bool, None, IntArray]:
+        """Refine the chosen links; returns the rows of those that came for them."""
+        work = refine(self._state, self._linker, self._pace, light, choice)
+        # The leaves are others from the first slice on.
+        self.version += 1
+        while True:
+            try:
+                self._ray_count += STRATA * next(work)
+            except StopIteration as end:
+                rows: IntArray = end.value
+                return rows
+            yield True
 
     def _settle(self, target: float, strict: bool = False) -> Generator[bool, None, bool]:
         for _ in balance(self._state, self._closed, strict):
@@ -229,12 +239,13 @@ class RadiositySolver(SlicedSolve):
         n = self.surfaces.patch_count
         rows = max(1, min(n, _FACING_AT_ONCE // max(n, 1)))
         light = Light(np.zeros(n), np.zeros(n), 1.0)
+        everything = np.arange(n, dtype=np.int32)
         for start in range(0, n, rows):
-            p, q = self._linker.facing_pairs(start, min(start + rows, n))
+            p, q = self._linker.facing_pairs(everything, everything, start, min(start + rows, n))
             yield True
             batches = []
             for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
-                batches.append(self._linker.link_patches(self._state.tree, p[part], q[part], light))
+                batches.append(self._linker.link(self._state.tree, p[part], q[part], light))
                 self._ray_count += STRATA * int(batches[-1].samples.sum())
                 # Rows get shorter towards the end, since each pair is looked at once.
                 left = 1.0 - (start + rows * part.stop / len(p)) / n
@@ -242,20 +253,7 @@ class RadiositySolver(SlicedSolve):
                 yield True
             for batch in batches:
                 self._state.links.append(batch)
+            self.linked = min(start + rows, n)
             if len(self._state.links) > self.settings.max_links:
                 self.outcome = SolveOutcome.LINK_LIMIT
                 return
-
-
-def _patch_keys(surfaces: Surfaces) -> list[tuple[str, int, int, int]]:
-    """Names of patches that survive edits of other objects: object, face, side, rank within the face."""
-    seen: dict[tuple[str, int, int], int] = {}
-    keys = []
-    for index, face, side in zip(
-        surfaces.object.tolist(), surfaces.face.tolist(), surfaces.side.tolist(), strict=True
-    ):
-        base = (surfaces.object_ids[index], face, side)
-        rank = seen.get(base, 0)
-        seen[base] = rank + 1
-        keys.append((*base, rank))
-    return keys

@@ -10,7 +10,7 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
-from solver.transport.pushpull import irradiance, irradiance_in_steps
+from solver.transport.pushpull import irradiance, irradiance_in_steps, push
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Spectra
 
 
@@ -83,6 +83,11 @@ class TransportState:
         self.gathers += 1
         return irradiance_in_steps(self.tree, self.links, self.closure, self.remainder, radiosity)
 
+    def add_received(self, arrived: FloatArray, factor: float = 1.0) -> None:
+        """Take in irradiance functions (n, 3, channels) as links bring them to their ends, times `factor`."""
+        push(self.tree.parent, self.tree.offset, arrived)
+        self.received += (factor * self.closure)[:, None, None] * arrived
+
     def split(self, ids: IntArray) -> None:
         """Subdivide leaves; the children start with their parent's light."""
         before = len(self.tree)
@@ -94,6 +99,8 @@ class TransportState:
             fresh = functions[parent]
             fresh[:, 0] += np.einsum("nk,nkc->nc", offset, fresh[:, 1:])
             setattr(self, name, np.concatenate([functions, fresh]))
+        self.closure = np.concatenate([self.closure, self.closure[parent]])
+        self.remainder = np.concatenate([self.remainder, np.zeros((len(parent), 3))])
 
 
 def _ambient(area: FloatArray, emission: Spectra, reflectance: Spectra) -> FloatArray:

@@ -6,19 +6,28 @@ only at what blocked their parents.
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import ByteArray, Corners, FloatArray, IntArray
+from solver.types import ByteArray, Corners, FloatArray, Int64Array, IntArray
 from solver.visibility.bvh import walk_hierarchy
 from solver.visibility.culling import BLOCK, LANES, MAY_COVER, OUTSIDE, cull_block, gather_blocks
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, covers, shaft_planes
+
+UNCHANGED: Final = 3
+UNKNOWN: Final = 4
+"""What `renewed_blockers` says beside FULL, PARTIAL and NONE."""
 
 
 @kernel
 def first_blockers(
     pair_p: IntArray,
     pair_q: IntArray,
+    element_corners: Corners,
+    element_counts: IntArray,
+    patch: IntArray,
     corners: Corners,
     counts: IntArray,
     normals: FloatArray,
@@ -35,7 +44,7 @@ def first_blockers(
     blocker_count: IntArray,
     pool: IntArray,
 ) -> int:
-    """Blockers of top-level pairs [start, stop) of patches, appended to `pool`; returns the pool's use.
+    """Blockers of pairs [start, stop) of elements, patches appended to `pool`; returns the pool's use.
 
     Writes visibility (FULL, PARTIAL, NONE) and blocker_count per pair. If the pool is too small the
     return value is -1 - (pairs done): call again from there with a fresh pool.
@@ -50,8 +59,9 @@ def first_blockers(
         p = pair_p[pair]
         q = pair_q[pair]
         plane_count = shaft_planes(
-            corners[p], counts[p], normals[p], corners[q], counts[q], normals[q], planes
-        )
+            element_corners[p], element_counts[p], normals[patch[p]], element_corners[q], element_counts[q],
+            normals[patch[q]], planes,
+        )  # fmt: skip
         found = walk_hierarchy(
             low, high, skip, leaf_first, leaf_count, order, planes, plane_count, tolerance, candidates
         )
@@ -59,8 +69,9 @@ def first_blockers(
             return -1 - (pair - start)
         gather_blocks(corners, normals, candidates, 0, found, blocks)
         visibility[pair], blocker_count[pair] = _cull(
-            corners, counts, normals, p, q, corners[p], counts[p], corners[q], counts[q], planes,
-            plane_count, candidates, 0, found, blocks, tolerance, work, verdict, pool, used,
+            corners, counts, normals, patch[p], patch[q], element_corners[p], element_counts[p],
+            element_corners[q], element_counts[q], planes, plane_count, candidates, 0, found, blocks,
+            tolerance, work, verdict, pool, used,
         )  # fmt: skip
         used += blocker_count[pair]
     return used
@@ -147,3 +158,89 @@ def inherited_blockers(
         corners, counts, normals, -1, -1, first, n1, second, n2, planes, plane_count, parents, parent_start,
         parent_count, blocks, tolerance, work, verdict, out, used,
     )  # fmt: skip
+
+
+@kernel
+def renewed_blockers(
+    pair_p: IntArray,
+    pair_q: IntArray,
+    before: IntArray,
+    element_corners: Corners,
+    element_counts: IntArray,
+    patch: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    skip: IntArray,
+    leaf_first: IntArray,
+    leaf_count: IntArray,
+    order: IntArray,
+    tolerance: float,
+    list_start: Int64Array,
+    list_count: IntArray,
+    lists: IntArray,
+    start: int,
+    stop: int,
+    room: Int64Array,
+    visibility: IntArray,
+    blocker_count: IntArray,
+    pool: IntArray,
+) -> None:
+    """Blockers of pairs [start, stop) of elements, from those known before some patches came or went.
+
+    Patches that went are -1 in the lists; those that came are in the hierarchy. `before` is the visibility
+    class that was. Writes the class, UNCHANGED where nothing is different, or UNKNOWN where what hid the
+    pair entirely is gone, so that the other blockers are not known; and the lists where they are different,
+    to pool[room[pair]:].
+    """
+    planes = np.empty((MAX_PLANES, 4))
+    candidates = np.empty(len(order), dtype=np.int32)
+    blocks = np.empty((len(order) + LANES - 1) // LANES * BLOCK)
+    work = np.empty(5 * LANES)
+    verdict = np.empty(LANES, dtype=np.uint8)
+    for pair in range(start, stop):
+        p = pair_p[pair]
+        q = pair_q[pair]
+        kept = 0
+        for k in range(list_start[pair], list_start[pair] + list_count[pair]):
+            if lists[k] >= 0:
+                pool[room[pair] + kept] = lists[k]
+                kept += 1
+        lost = kept < list_count[pair]
+        if before[pair] == NONE:
+            visibility[pair] = UNKNOWN if lost else UNCHANGED
+            continue
+        plane_count = shaft_planes(
+            element_corners[p], element_counts[p], normals[patch[p]], element_corners[q], element_counts[q],
+            normals[patch[q]], planes,
+        )  # fmt: skip
+        found = walk_hierarchy(
+            low, high, skip, leaf_first, leaf_count, order, planes, plane_count, tolerance, candidates
+        )
+        fresh = 0
+        for k in range(found):
+            known = False
+            for m in range(room[pair], room[pair] + kept):
+                if pool[m] == candidates[k]:
+                    known = True
+                    break
+            if not known:
+                candidates[fresh] = candidates[k]
+                fresh += 1
+        gather_blocks(corners, normals, candidates, 0, fresh, blocks)
+        kind, added = _cull(
+            corners, counts, normals, patch[p], patch[q], element_corners[p], element_counts[p],
+            element_corners[q], element_counts[q], planes, plane_count, candidates, 0, fresh, blocks,
+            tolerance, work, verdict, pool, room[pair] + kept,
+        )  # fmt: skip
+        if kind == NONE:
+            pool[room[pair]] = pool[room[pair] + kept]
+            visibility[pair] = NONE
+            blocker_count[pair] = 1
+        elif added == 0 and not lost:
+            visibility[pair] = UNCHANGED
+        else:
+            visibility[pair] = FULL if kept + added == 0 else PARTIAL
+            blocker_count[pair] = kept + added

@@ -62,11 +62,12 @@ def classify(soup: Soup, pool_size: int | None = None) -> Classified:
     p, q = np.array(pairs, dtype=np.int32).reshape(-1, 2).T.copy()
     kind, count = np.full(len(p), -1, dtype=np.int32), np.zeros(len(p), dtype=np.int32)
     lists: list[set[int]] = []
+    patch = np.arange(s.patch_count, dtype=np.int32)
     at = 0
     while at < len(p):
         pool = np.empty(pool_size or len(p) * s.patch_count, dtype=np.int32)
         used = first_blockers(
-            p, q, s.corners, s.corner_count, s.normal, tree.low, tree.high,
+            p, q, s.corners, s.corner_count, patch, s.corners, s.corner_count, s.normal, tree.low, tree.high,
             tree.skip, tree.first, tree.count, tree.order, side_tolerance(soup), at, len(p), kind, count,
             pool,
         )  # fmt: skip

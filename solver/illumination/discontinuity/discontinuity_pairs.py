@@ -101,12 +101,13 @@ def find_blockers(
     visibility, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
     pieces: list[IntArray] = []
     s, h = surfaces, hierarchy
+    patch = np.arange(s.patch_count, dtype=np.int32)
     at, room = 0, 64 * n + len(h.order)
     while at < n:
         pool = np.empty(room, dtype=np.int32)
         used = first_blockers(
-            receivers, sources, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip, h.first, h.count,
-            h.order, tolerance, at, n, visibility, kept, pool,
+            receivers, sources, s.corners, s.corner_count, patch, s.corners, s.corner_count, s.normal, h.low,
+            h.high, h.skip, h.first, h.count, h.order, tolerance, at, n, visibility, kept, pool,
         )  # fmt: skip
         done = n - at if used >= 0 else -1 - used
         count = kept[at : at + done]

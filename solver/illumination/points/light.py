@@ -127,9 +127,8 @@ class Lamps:
         p, q = p[facing], q[facing]
         n = len(p)
         kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
-        normals = surfaces.normal[patch]
         lists: dict[int, IntArray] = {}
-        h = hierarchy
+        h, s = hierarchy, surfaces
 
         def work(start: int, stop: int) -> None:
             pieces = []
@@ -137,8 +136,8 @@ class Lamps:
             while at < stop:
                 pool = np.empty(64 * (stop - at) + len(h.order), dtype=np.int32)
                 used = first_blockers(
-                    p, q, corners, counts, normals, h.low, h.high, h.skip, h.first, h.count, h.order,
-                    tolerance, at, stop, kind, kept, pool,
+                    p, q, corners, counts, patch, s.corners, s.corner_count, s.normal, h.low, h.high, h.skip,
+                    h.first, h.count, h.order, tolerance, at, stop, kind, kept, pool,
                 )  # fmt: skip
                 done = stop - at if used >= 0 else -1 - used
                 pieces.append(pool[: int(kept[at : at + done].sum())].copy())

@@ -7,6 +7,7 @@ import pytest
 
 from solver.engine.world import World
 from solver.geometry.scene import Mesh, SceneObject
+from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import SolveOutcome
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
@@ -15,7 +16,7 @@ from tests.transport.solving import DEFAULT, finish, lit_cube, shelf, solved, so
 
 
 def warm(after: World, before: RadiositySolver) -> RadiositySolver:
-    return RadiositySolver(after.surfaces, after.rays, DEFAULT, before)
+    return Redistribution(after.surfaces, after.rays, DEFAULT, before)
 
 
 def patch_means(solver: RadiositySolver) -> FloatArray:

@@ -1,0 +1,111 @@
+"""A solution taken over into the next revision of its scene ([G eq. 3 to 5]).
+
+Elements and links of what an edit leaves alone stay as they are, with the radiosity that they have. What goes
+takes the light with it that it had sent: its links shoot their energy once more, as negative energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.geometry.surfaces import Surfaces
+from solver.redistribution.matching import Match
+from solver.transport.elements import ElementTree
+from solver.transport.pushpull import gather, means, pull
+from solver.transport.state import TransportState
+from solver.types import FloatArray, IntArray
+
+
+def carry(state: TransportState, surfaces: Surfaces, match: Match) -> TransportState:
+    """What `state` is in the scene of `surfaces`; its link table is handed over, not copied.
+
+    Links that may be blocked by patches that are gone must be in debt; those of such patches are removed.
+    Irradiance is right but for links that the edit has changed, and for fresh patches, whose irradiance is a
+    guess: what they received where they were before, or the ambient term.
+    """
+    tree, number = ElementTree.carried(surfaces, state.tree, match.number)
+    links = state.links
+    removed = np.flatnonzero((number[links.p] < 0) | (number[links.q] < 0)).astype(np.int32)
+    lost = sent_over(state, removed)
+    links.forget(np.flatnonzero(links.debt).astype(np.int32), match.number)
+    links.remove(removed)
+    links.renumber(number, match.number)
+
+    blank = TransportState.of(surfaces)
+    n, channels = len(tree), blank.channels
+    after = replace(
+        blank,
+        tree=tree,
+        links=links,
+        radiosity=np.zeros((n, 3, channels)),
+        received=np.zeros((n, 3, channels)),
+        closure=np.ones(n),
+        remainder=np.zeros((n, 3)),
+        gathers=state.gathers,
+    )
+    kept = np.flatnonzero(number >= 0)
+    to = number[kept]
+    after.closure[to] = state.closure[kept]
+    after.remainder[to] = state.remainder[kept]
+    after.radiosity[to] = _in_channels(state, state.radiosity[kept], channels)
+    after.received[to] = _in_channels(state, state.received[kept], channels)
+    if len(removed):
+        missing = np.zeros_like(after.received)
+        missing[to] = _in_channels(state, lost[kept], channels)
+        after.add_received(missing, -1.0)
+    _repaint(state, after, match)
+    fresh = match.fresh
+    known = match.likeness[fresh] >= 0
+    after.received[fresh, 0] = blank.received[fresh, 0]
+    if known.any():
+        before = _in_channels(state, means(state.tree, state.received), channels)
+        after.received[fresh[known], 0] = before[match.likeness[fresh[known]]]
+    after.radiosity[fresh, 0] = after.emission[fresh] + after.reflectance[fresh] * after.received[fresh, 0]
+    return after
+
+
+def sent_over(state: TransportState, rows: IntArray) -> FloatArray:
+    """Irradiance functions (n, 3, channels) that the links `rows` bring to their own ends."""
+    arrived = np.zeros_like(state.received)
+    if len(rows):
+        links = state.links
+        exchange = links.open_exchange[rows] * links.visibility[rows]
+        gather(
+            links.p[rows], links.q[rows], exchange, links.slope_p[rows], links.slope_q[rows],
+            state.tree.area, moments_of(state), 0, len(rows), arrived,
+        )  # fmt: skip
+    return arrived
+
+
+def moments_of(state: TransportState) -> FloatArray:
+    """Means and first moments (n, 3, channels) of what all elements send."""
+    tree = state.tree
+    sent = state.radiosity * state.closure[:, None, None]
+    moments = np.empty_like(sent)
+    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, sent, moments)
+    return moments
+
+
+def _repaint(before: TransportState, after: TransportState, match: Match) -> None:
+    """Let patches of another material than before shine by it, in the light that they have."""
+    stays = np.flatnonzero(match.number >= 0)
+    now = match.number[stays]
+    old, new = before.surfaces, after.surfaces
+    changed = np.zeros(new.patch_count, dtype=np.bool_)
+    changed[now] = np.any(old.emission[stays] != new.emission[now], axis=1)
+    changed[now] |= np.any(old.reflectance[stays] != new.reflectance[now], axis=1)
+    rows = np.flatnonzero(changed[after.tree.patch])
+    patch = after.tree.patch[rows]
+    after.radiosity[rows] = after.reflectance[patch][:, None] * after.received[rows]
+    after.radiosity[rows, 0] += after.emission[patch]
+
+
+def _in_channels(state: TransportState, values: FloatArray, channels: int) -> FloatArray:
+    """Values (..., channels of `state`) in as many channels as there are now."""
+    if values.shape[-1] == channels:
+        return values
+    if channels == 1:
+        return np.asarray(values @ state.weights)[..., None]
+    return np.repeat(values, channels, axis=-1)

@@ -1,0 +1,295 @@
+"""Redistribution: the solution of an edited scene out of the one before ([G]).
+
+With residuals the paper's two kinds of shots are one. A link whose form factor an edit has changed by
+delta F shoots delta F times the radiosity that its ends have shot: positive energy where something is seen
+that was hidden, negative where a shadow falls ([G eq. 5]). What arrives is unshot, and is propagated by the
+solve as ever ([G eq. 6]). A solution that had not converged has shot less, and so has less to redistribute.
+
+An edit finds out which links it has touched, and owes them a new look; debts are paid in the order of the
+energy at stake. Another edit may interrupt at any time: it takes over what is still owed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from solver import tolerances
+from solver.geometry.surfaces import Surfaces
+from solver.redistribution.carrying import carry, moments_of
+from solver.redistribution.debts import UnlinkedPairs, owe_for_coming, owe_for_leaving
+from solver.redistribution.energy import doubt_of, energies_at_stake, unshot_square
+from solver.redistribution.matching import Match, match_patches
+from solver.transport.estimate import Residuals
+from solver.transport.field import RadiosityField
+from solver.transport.linking import Light
+from solver.transport.links import LinkBatch
+from solver.transport.pushpull import gather, means
+from solver.transport.refine import NOISE_SHARE, Choice, choose_above
+from solver.transport.settings import SolverSettings
+from solver.transport.solve import RadiositySolver
+from solver.transport.state import TransportState
+from solver.types import BoolArray, FloatArray, IntArray
+from solver.visibility.bvh import build_hierarchy
+from solver.visibility.pair_rays import STRATA
+from solver.visibility.rays import RayScene
+
+_PROGRESS: Final = 0.5
+"""Part of the progress that redistribution makes."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What is to be looked at, the most important first; n debts."""
+
+    rows: IntArray
+    """(n,) the link, or -1: the next pair without one"""
+    debt: IntArray
+    """(n,) number of the edit"""
+    energy: FloatArray
+    """(n,) at stake, W of luminance"""
+    left: FloatArray
+    """(n + 1,) sum of this and all later energies"""
+    doubt: float
+    """RMS of the radiosity that is at stake, relative to what is reflected"""
+    light: Light
+
+    def share_left(self, done: int) -> float:
+        """Part of the energy that is still at stake."""
+        return float(self.left[done] / self.left[0]) if self.left[0] > 0.0 else 0.0
+
+
+class Redistribution(RadiositySolver):
+    """The solution of a scene, from that of an earlier revision, which is used up."""
+
+    def __init__(
+        self,
+        surfaces: Surfaces,
+        rays: RayScene,
+        settings: SolverSettings,
+        earlier: RadiositySolver,
+        number: int = 1,
+        drags: bool = False,
+    ) -> None:
+        """Take over what `earlier` has and owes; no light is moved yet but what has gone with its surfaces.
+
+        `number`: of the edit, greater than those before. `drags`: it moves the object that the edit before
+        moved, and no other.
+        """
+        super().__init__(surfaces, rays, settings)
+        match = match_patches(earlier.surfaces, surfaces)
+        margin = 2.0 * tolerances.SIDE * max(surfaces.size, earlier.surfaces.size)
+        state = earlier.hand_over()
+        owe_for_leaving(state, match, number, margin, drags)
+        self._state = carry(state, surfaces, match)
+        owe_for_coming(self._state, match, number, margin)
+        owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
+        self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
+        self.bound = earlier.bound
+        self.linked = surfaces.patch_count
+        self._known_error = earlier.error_estimate
+        self.error_estimate = 1.0
+        self.recent = self._fresh_since(match, earlier)
+        """(p,) patches that some link in debt has never met"""
+        self._near = build_hierarchy(
+            surfaces.corners, np.flatnonzero(self.recent & (surfaces.side == 0)).astype(np.int32)
+        )
+        self._fresh = match.fresh
+        self._guess = self._state.received[self._fresh, 0].copy()
+        self._guessed = 1.0
+        """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
+        self._guessed_now = 1.0
+        self._arrived: FloatArray | None = None
+        self._plan: _Plan | None = None
+        self._paid = 0
+        self._new = np.empty(0, dtype=np.int32)
+        self.shots = 0
+        """Links and pairs looked at anew"""
+
+    @property
+    def unlinked(self) -> UnlinkedPairs:
+        """Pairs that are to be linked."""
+        return self._unlinked
+
+    @property
+    def owes(self) -> bool:
+        """Whether there are debts."""
+        return len(self._unlinked) > 0 or bool(self._state.links.debt.any())
+
+    def hand_over(self) -> TransportState:
+        """The state, with what has arrived so far."""
+        self._take_in()
+        return super().hand_over()
+
+    def field(self) -> RadiosityField:
+        """As the solve's, with what has arrived so far."""
+        self._take_in()
+        return super().field()
+
+    def owed(self) -> dict[int, float]:
+        """W of luminance that is still at stake, by the numbers of the edits that it is owed to."""
+        plan = self._plan or self._make_plan()
+        debt, energy = plan.debt[self._paid :], plan.energy[self._paid :]
+        numbers, place = np.unique(np.abs(debt), return_inverse=True)
+        return dict(zip(numbers.tolist(), np.bincount(place, energy, len(numbers)).tolist(), strict=True))
+
+    # --- the work, in slices -------------------------------------------------------------------------
+
+    def _open(self) -> Iterator[bool]:
+        plan = self._plan or self._make_plan()
+        state = self._state
+        moments = moments_of(state)
+        self._arrived = np.zeros_like(state.received)
+        # What has been shot is as uncertain as what has not, until it is propagated.
+        self.error_estimate = min(1.0, math.hypot(self._known_error, plan.doubt))
+        changed: list[IntArray] = []
+        old = len(state.links)
+        yield True
+        for part in self._pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
+            changed.append(self._look_again(plan.rows[part], plan.light, moments))
+            paired = int((plan.rows[part] < 0).sum())
+            self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], plan.light, moments)
+            self._unlinked = self._unlinked.without(paired)
+            self._paid = part.stop
+            self.shots += part.stop - part.start
+            self.version += 1
+            self._guessed_now = self.unshot_fraction = share = plan.share_left(part.stop)
+            self.progress = _PROGRESS * (1.0 - share)
+            yield True
+        self._take_in()
+        self._arrived = None
+        unshot, scale = unshot_square(state)
+        new = math.sqrt(unshot / scale) if scale > 0.0 else 1.0
+        self.error_estimate = min(1.0, math.hypot(self._known_error, new))
+        self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
+        yield from self._refine_as_before()
+
+    def _refine_as_before(self) -> Iterator[bool]:
+        """Refine what is new until it errs no more than what was there, in the light that has arrived."""
+        state = self._state
+        if self.bound <= 0.0 or len(self._new) == 0:
+            return
+        patch = state.tree.patch
+        state.radiosity = state.reflectance[patch][:, None] * state.received
+        state.radiosity[:, 0] += state.emission[patch]
+        residuals = Residuals.of(state)
+        rows = self._new
+        while True:
+            choice = choose_above(state, rows, residuals.estimate(state, rows), self.settings, self.bound)
+            yield True
+            if not isinstance(choice, Choice):
+                return
+            rows = yield from self._refine(residuals.light, choice)
+            rows.sort()
+            residuals = residuals.grown(state, rows)
+
+    def _make_plan(self) -> _Plan:
+        """All debts in the order of the energy at stake; `_unlinked` gets into that order too."""
+        state, pairs = self._state, self._unlinked
+        links, tree = state.links, state.tree
+        rows = np.flatnonzero(links.debt).astype(np.int32)
+        radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
+        reflectance = (state.reflectance @ state.weights)[tree.patch]
+        p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
+        energy = np.empty(len(p))
+        energies_at_stake(
+            p, q, np.concatenate([links.open_exchange[rows], np.zeros(len(pairs))]), tree.area, tree.centroid,
+            tree.patch, self.surfaces.normal, radiosity, reflectance, energy,
+        )  # fmt: skip
+        order = np.argsort(-energy, kind="stable")
+        paired = order[order >= len(rows)] - len(rows)
+        self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
+        _, scale = unshot_square(state)
+        self._plan = _Plan(
+            doubt=doubt_of(p, q, energy, tree.area) / math.sqrt(max(scale, 1e-300)),
+            rows=np.concatenate([rows, np.full(len(pairs), -1, dtype=np.int32)])[order],
+            debt=np.concatenate([links.debt[rows], pairs.debt])[order],
+            energy=energy[order],
+            left=np.append(np.cumsum(energy[order][::-1])[::-1], 0.0),
+            light=Light(radiosity, reflectance, NOISE_SHARE * self.bound),
+        )
+        return self._plan
+
+    def _look_again(self, rows: IntArray, light: Light, moments: FloatArray) -> IntArray:
+        """Let links shoot what their form factors have changed by; rows below 0 are none.
+
+        Returns the rows (m,) that have changed.
+        """
+        rows = rows[rows >= 0]
+        if len(rows) == 0:
+            return rows
+        links = self._state.links
+        changed, fresh = self._linker.renew(self._state.tree, links, rows, self._near, light)
+        exchange = links.open_exchange[changed] * links.visibility[changed]
+        self._shoot(
+            fresh,
+            fresh.open_exchange * fresh.visibility - exchange,
+            fresh.slope_p - links.slope_p[changed],
+            fresh.slope_q - links.slope_q[changed],
+            moments,
+        )
+        links.overwrite(changed, fresh)
+        links.debt[rows] = 0
+        return changed
+
+    def _link(self, p: IntArray, q: IntArray, light: Light, moments: FloatArray) -> None:
+        """Link pairs of patches, and shoot over them all that they have shot at others before."""
+        if len(p) == 0:
+            return
+        fresh = self._linker.link(self._state.tree, p, q, light)
+        self._shoot(fresh, fresh.open_exchange * fresh.visibility, fresh.slope_p, fresh.slope_q, moments)
+        self._state.links.append(fresh)
+
+    def _shoot(
+        self,
+        batch: LinkBatch,
+        exchange: FloatArray,
+        slope_p: FloatArray,
+        slope_q: FloatArray,
+        moments: FloatArray,
+    ) -> None:
+        assert self._arrived is not None
+        self._ray_count += STRATA * int(batch.samples.sum())
+        gather(
+            batch.p, batch.q, exchange, slope_p, slope_q, self._state.tree.area, moments, 0, len(batch.p),
+            self._arrived,
+        )  # fmt: skip
+
+    def _take_in(self) -> None:
+        """Add what has arrived to what elements have received."""
+        if self._arrived is None:
+            return
+        self._state.add_received(self._arrived)
+        self._arrived[...] = 0.0
+        self._state.received[self._fresh, 0] -= (self._guessed - self._guessed_now) * self._guess
+        self._guessed = self._guessed_now
+
+    def _fresh_since(self, match: Match, earlier: RadiositySolver) -> BoolArray:
+        """Patches (p,) that some link in debt has never met."""
+        recent = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
+        if isinstance(earlier, Redistribution) and earlier.owes:
+            before = match.number[np.flatnonzero(earlier.recent)]
+            recent[before[before >= 0]] = True
+        recent[match.fresh] = True
+        return recent
+
+    def _fresh_pairs(self, match: Match, number: int, earlier: RadiositySolver) -> UnlinkedPairs:
+        """Pairs of fresh patches with all others, and what an interrupted first linking left over."""
+        n = self.surfaces.patch_count
+        fresh = match.fresh
+        rank = np.full(n, n, dtype=np.int32)
+        rank[fresh] = np.arange(len(fresh), dtype=np.int32)
+        p, q = self._linker.facing_pairs(fresh, rank, 0, len(fresh))
+        pairs = UnlinkedPairs(p, q, np.full(len(p), number, dtype=np.int32))
+        left = match.number[earlier.linked :]
+        left = left[left >= 0]
+        if len(left) == 0:
+            return pairs
+        rank = np.full(n, -1, dtype=np.int32)
+        rank[left] = np.arange(len(left), dtype=np.int32)
+        p, q = self._linker.facing_pairs(left, rank, 0, len(left))
+        return pairs.joined(UnlinkedPairs(p, q, np.full(len(p), number, dtype=np.int32)))
