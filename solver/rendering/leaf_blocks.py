@@ -7,24 +7,32 @@ others can be kept, wherever these have moved to in the field.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
-from solver.illumination.meshing.cells import Leaves
+from solver.illumination.meshing.cells import Cells, Leaves
 from solver.kernels import kernel
+from solver.parallel import run_chunks
 from solver.types import BoolArray, Corners, Int64Array, IntArray
+
+_PATCHES: Final = 128
+"""Patches of a piece of work"""
 
 
 @dataclass(frozen=True, eq=False)
 class LeafBlocks:
     """n leaves of p patches, patch by patch; those of one patch in the order that their field has them in."""
 
-    corners: Corners
-    corner_count: IntArray
-    patch: IntArray
+    field: Leaves
+    """Whose leaves these are, in its own order"""
     order: IntArray
     """(n,) number of each leaf in the field"""
+    corner_count: IntArray
+    """(n,)"""
+    patch: IntArray
+    """(n,)"""
     start: IntArray
     """(p + 1,) where the leaves of each patch begin"""
 
@@ -35,16 +43,18 @@ class LeafBlocks:
         start = np.zeros(patch_count + 1, dtype=np.int32)
         order = np.empty(n, dtype=np.int32)
         _sort(leaves.patch, start, order)
-        # Adding 0 makes -0 into 0, which have different bits.
-        corners = leaves.corners.take(order, axis=0)
-        corners += 0.0
-        return LeafBlocks(corners, leaves.corner_count[order], leaves.patch[order], order, start)
+        return LeafBlocks(leaves, order, leaves.corner_count[order], leaves.patch[order], start)
 
     @staticmethod
     def none() -> LeafBlocks:
         """No leaves of no patches."""
         nothing = np.empty(0, dtype=np.int32)
-        return LeafBlocks(np.empty((0, 4, 3)), nothing, nothing, nothing, np.zeros(1, dtype=np.int32))
+        return LeafBlocks.of(Cells(np.empty((0, 4, 3)), nothing, nothing, nothing), 0)
+
+    @property
+    def corners(self) -> Corners:
+        """(n, 4, 3) metres, gathered with every call."""
+        return self.field.corners.take(self.order, axis=0)
 
     def only(self, chosen: BoolArray) -> LeafBlocks:
         """The same with no leaves but those of the patches (p,) that are `chosen`."""
@@ -53,16 +63,19 @@ class LeafBlocks:
         kept = np.flatnonzero(chosen[self.patch])
         start = np.zeros_like(self.start)
         np.cumsum(np.where(chosen, np.diff(self.start), 0), out=start[1:])
-        return LeafBlocks(
-            self.corners[kept], self.corner_count[kept], self.patch[kept], self.order[kept], start
-        )
+        return LeafBlocks(self.field, self.order[kept], self.corner_count[kept], self.patch[kept], start)
 
     def as_before(self, before: LeafBlocks, earlier: IntArray) -> IntArray:
         """`earlier` (p,), a patch of `before` or -1 for each, with -1 for all whose leaves differ."""
         same = earlier.copy()
-        _compare(
-            self.start, self.corner_count, self.corners.view(np.int64),
-            before.start, before.corner_count, before.corners.view(np.int64), same,
+        ours, theirs = (_bits(blocks.field.corners) for blocks in (self, before))
+        run_chunks(
+            lambda begin, end: _compare(
+                begin, end, self.start, self.order, self.corner_count, ours,
+                before.start, before.order, before.corner_count, theirs, same,
+            ),
+            len(same),
+            _PATCHES,
         )  # fmt: skip
         return same
 
@@ -91,6 +104,10 @@ def _runs(surfaces: Surfaces) -> tuple[Int64Array, Int64Array]:
     return np.cumsum(count) - count, count
 
 
+def _bits(corners: Corners) -> Int64Array:
+    return np.ascontiguousarray(corners).view(np.int64)
+
+
 @kernel
 def _sort(patch: IntArray, start: IntArray, order: IntArray) -> None:
     """A counting sort by patch, stable."""
@@ -106,15 +123,19 @@ def _sort(patch: IntArray, start: IntArray, order: IntArray) -> None:
 
 @kernel
 def _compare(
+    begin: int,
+    end: int,
     start: IntArray,
+    order: IntArray,
     count: IntArray,
     bits: Int64Array,
     start_before: IntArray,
+    order_before: IntArray,
     count_before: IntArray,
     bits_before: Int64Array,
     earlier: IntArray,
 ) -> None:
-    for p in range(len(earlier)):
+    for p in range(begin, end):
         q = earlier[p]
         if q < 0:
             continue
@@ -124,9 +145,11 @@ def _compare(
         leaf = first
         while same and leaf < start[p + 1]:
             same = count[leaf] == count_before[leaf + shift]
+            a = order[leaf]
+            b = order_before[leaf + shift]
             for k in range(4):
                 for axis in range(3):
-                    same &= bits[leaf, k, axis] == bits_before[leaf + shift, k, axis]
+                    same &= bits[a, k, axis] == bits_before[b, k, axis]
             leaf += 1
         if not same:
             earlier[p] = -1

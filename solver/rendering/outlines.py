@@ -67,7 +67,7 @@ def outline(field: RadiosityField, surfaces: Surfaces, before: Outlines | None) 
         inside_start, inside, middle, first_triangle,
     )  # fmt: skip
     fans = np.flatnonzero(middle >= 0)
-    centres = _middles(blocks.corners[fans], blocks.corner_count[fans])
+    centres = _middles(blocks.field.corners[blocks.order[fans]], blocks.corner_count[fans])
     position = np.concatenate([topology.position, seams.position, centres])
     position -= surfaces.center
     position /= surfaces.size

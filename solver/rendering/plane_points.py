@@ -42,9 +42,7 @@ def plane_points(leaves: Leaves, surfaces: Surfaces, topology: Topology) -> Plan
     origin = surfaces.corners[:, 0]
     flat, centroid = np.empty((v, 2)), np.empty((n, 2))
     on_border = np.zeros(v, dtype=np.bool_)
-    leaf, slot = topology.border >> 2, topology.border & 3
-    on_border[topology.vertex[leaf, slot]] = True
-    on_border[topology.vertex[leaf, (slot + 1) % count[leaf]]] = True
+    _mark_border(topology.border, topology.vertex, count, on_border)
 
     def work(start: int, stop: int) -> None:
         _flatten(
@@ -62,6 +60,14 @@ def _axes(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
     u = cross(helper, normal)
     u = u / np.linalg.norm(u, axis=1, keepdims=True)
     return u, cross(normal, u)
+
+
+@kernel
+def _mark_border(border: IntArray, vertex: IntArray, count: IntArray, on_border: BoolArray) -> None:
+    for edge in border:
+        leaf, k = edge >> 2, edge & 3
+        on_border[vertex[leaf, k]] = True
+        on_border[vertex[leaf, k + 1 if k + 1 < count[leaf] else 0]] = True
 
 
 @kernel

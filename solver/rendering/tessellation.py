@@ -15,16 +15,21 @@ for scenes of any size at any place.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.kernels import inline_kernel, kernel
+from solver.parallel import run_chunks
 from solver.rendering.middles import fill_middles
 from solver.rendering.outlines import Outlines, outline
 from solver.rendering.reconstruction import vertex_irradiance
 from solver.transport.field import RadiosityField
 from solver.types import LUMINANCE_WEIGHTS, Float32Array, FloatArray, IntArray
+
+_CHUNK: Final = 1 << 14
+"""Leaves or vertices of a piece of work"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +112,8 @@ def _all_values(field: RadiosityField, outlines: Outlines) -> FloatArray:
     on_seams = start + seams.fraction[:, None] * (end - start)
     fans = np.flatnonzero(outlines.middle >= 0)
     in_middles = np.empty((len(fans), 3))
-    fill_middles(
-        blocks.corners[fans], blocks.corner_count[fans], vertex[fans], means[fans], values, in_middles
-    )
+    corners = field.corners[blocks.order[fans]]
+    fill_middles(corners, blocks.corner_count[fans], vertex[fans], means[fans], values, in_middles)
     return np.concatenate([values, on_seams, in_middles])
 
 
@@ -117,22 +121,35 @@ def _shade(values: FloatArray, outlines: Outlines) -> tuple[Float32Array, Float3
     """Irradiance (v, 3), radiance (v, 3) and the luminance of the irradiance (v,)."""
     surfaces = outlines.surfaces
     irradiance, radiance = np.empty(values.shape, np.float32), np.empty(values.shape, np.float32)
-    _fill_radiance(outlines.patch, surfaces.emission, surfaces.reflectance, values, irradiance, radiance)
+    run_chunks(
+        lambda start, stop: _fill_radiance(
+            start, stop, outlines.patch, surfaces.emission, surfaces.reflectance, values, irradiance, radiance
+        ),
+        len(values),
+        _CHUNK,
+    )
     return irradiance, radiance, values @ LUMINANCE_WEIGHTS
 
 
 def _triangulate(outlines: Outlines, luminance: FloatArray) -> IntArray:
     """Triangles (t, 3) of all leaves."""
     triangles = np.empty((len(outlines.leaf), 3), dtype=np.int32)
-    _fill_triangles(
-        outlines.connections.topology.vertex, outlines.blocks.corner_count, outlines.inside_start,
-        outlines.inside, outlines.middle, luminance, outlines.first_triangle, triangles,
+    blocks = outlines.blocks
+    run_chunks(
+        lambda start, stop: _fill_triangles(
+            start, stop, outlines.connections.topology.vertex, blocks.corner_count, outlines.inside_start,
+            outlines.inside, outlines.middle, luminance, outlines.first_triangle, triangles,
+        ),
+        len(blocks.order),
+        _CHUNK,
     )  # fmt: skip
     return triangles
 
 
 @kernel
 def _fill_radiance(
+    begin: int,
+    end: int,
     patch: IntArray,
     emission: FloatArray,
     reflectance: FloatArray,
@@ -140,7 +157,7 @@ def _fill_radiance(
     irradiance: Float32Array,
     radiance: Float32Array,
 ) -> None:
-    for i in range(len(patch)):
+    for i in range(begin, end):
         for c in range(3):
             irradiance[i, c] = values[i, c]
             radiance[i, c] = (emission[patch[i], c] + reflectance[patch[i], c] * values[i, c]) / np.pi
@@ -148,6 +165,8 @@ def _fill_radiance(
 
 @kernel
 def _fill_triangles(
+    begin: int,
+    end: int,
     vertex: IntArray,
     count: IntArray,
     inside_start: IntArray,
@@ -157,7 +176,7 @@ def _fill_triangles(
     start: IntArray,
     triangles: IntArray,
 ) -> None:
-    for leaf in range(len(count)):
+    for leaf in range(begin, end):
         at = start[leaf]
         corners = count[leaf]
         extra = inside_start[4 * leaf + 4] - inside_start[4 * leaf]
