@@ -7,6 +7,9 @@ luminous power each: along a curve that visits the patches one after the other, 
 one after the other, one is drawn from each of as many stretches of equal power. So they are spread as evenly
 over the light as points of low discrepancy are over a square, whatever became of those on the way.
 
+Lights that shine by narrow lobes make spots of what they shine on: of those there are more, and each is
+weaker, by the ratio of a lobe's root mean square to its mean.
+
 On cornell, lights of 2048 paths err by 3 to 4 % as they are, and by 1.3 % drawn from 64 times as many paths.
 """
 
@@ -26,6 +29,9 @@ from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
 PATHS: Final = 64
 """Paths walked for each that is kept."""
 
+_MOST_MORE: Final = 2.0
+"""Lights there may be for each that there would be without gloss"""
+
 _BITS: Final = 14
 """Binary digits of a place on a patch, along each axis: more than lights can tell apart."""
 
@@ -33,7 +39,8 @@ _BITS: Final = 14
 def thinned(lights: VirtualLights, surfaces: Surfaces, paths: int, seed: int = 0) -> VirtualLights:
     """As many of the `lights` of `lights.paths` paths as `paths` paths would have left; right in the mean.
 
-    On emitters those of the first `paths` paths are kept.
+    On emitters those of the first `paths` paths are kept. Where lights are glossy there are up to `_MOST_MORE`
+    times as many reflected ones.
     """
     if paths >= lights.paths:
         return lights
@@ -47,13 +54,16 @@ def thinned(lights: VirtualLights, surfaces: Surfaces, paths: int, seed: int = 0
     if len(reflected) == 0 or total <= 0.0:
         return replace(kept, paths=paths)
     reflected, luminance = _along_curve(lights, surfaces, reflected, luminance)
-    bounds = np.cumsum(luminance)
-    count = max(1, round(paths * bounds[-1] / total))
+    count = max(1, round(paths * float(luminance.sum()) / total))
+    # Of lights with lobes more are drawn, and of all together as many more as there may be.
+    weighed = luminance * np.sqrt(1.0 + 0.5 * np.maximum(lights.gloss[reflected], 0.0))
+    count = round(count * min(_MOST_MORE, float(weighed.sum() / luminance.sum())))
+    bounds = np.cumsum(weighed)
     random = np.random.default_rng((seed, first, paths))
     drawn = (np.arange(count) + random.random(count)) / count * bounds[-1]
     chosen = np.minimum(np.searchsorted(bounds, drawn, side="right"), len(reflected) - 1)
     few = lights.take(reflected[chosen])
-    share = bounds[-1] / (count * luminance[chosen])
+    share = bounds[-1] / (count * weighed[chosen])
     return join([kept, replace(few, power=few.power * share[:, None])], paths)
 
 

@@ -87,6 +87,27 @@ def test_colours_are_right_in_the_mean() -> None:
     assert np.all(error[[0, 2]] > 0.0)
 
 
+@pytest.mark.parametrize("exponent", [4.0, 60.0, 1000.0])
+def test_narrow_lobes_have_more_and_weaker_lights(exponent: float) -> None:
+    """Weaker by the ratio of a lobe's root mean square to its mean; and no more than twice as many in all."""
+    shiny = material(0.2, specular=(0.5, 0.4, 0.3), exponent=exponent)
+    of = cube(material(0.6), material(0.5, (2.0, 1.0, 3.0)), shiny, *[material(0.6)] * 3)
+    walked = of.block(PATHS * 32)
+    _, reflected = split(thinned(walked, of.surfaces, 32))
+    every, before = split(walked)
+    weight = np.sqrt(1.0 + 0.5 * np.maximum(before.gloss, 0.0))
+    more = float(luminous(before) @ weight / luminous(before).sum())
+    plain = round(32 * luminous(before).sum() / luminous(every).sum())
+    assert len(reflected) == pytest.approx(plain * min(more, 2.0), abs=1.0)
+    np.testing.assert_allclose(
+        luminous(reflected) * np.sqrt(1.0 + 0.5 * np.maximum(reflected.gloss, 0.0)),
+        (luminous(before) @ weight) / len(reflected),
+        rtol=1e-9,
+    )
+    found = [thinned(walked, of.surfaces, 32, seed).power.sum(axis=0) for seed in range(SEEDS)]
+    assert_agrees(*scatter(found), walked.power.sum(axis=0), passes=SEEDS)
+
+
 @pytest.mark.parametrize("name", ["cornell", "office"])
 def test_light_is_right_in_the_mean(name: str) -> None:
     """At points anywhere."""
