@@ -1,4 +1,4 @@
-"""OpenGL calls that the binding lacks: for depth that keeps its digits, and for texel buffers.
+"""OpenGL calls that the binding lacks: for depth that keeps its digits, for texel buffers, and to flush.
 
 A depth of near / distance, 1 at the near plane and 0 at infinity, has the same relative precision at
 every distance when it is stored as a float, however near the near plane: floats are densest at 0, where
@@ -56,6 +56,7 @@ class EntryPoints:
             return ctypes.CFUNCTYPE(None, *arguments)(library.eglGetProcAddress(name))
 
         self._clip_control = find(b"glClipControl", _Word, _Word)
+        self._flush = find(b"glFlush")
         self._bind_renderbuffer = find(b"glBindRenderbuffer", _Word, _Word)
         self._store = find(b"glRenderbufferStorage", _Word, _Word, _Count, _Count)
         self._make_textures = find(b"glGenTextures", _Count, _Address)
@@ -69,6 +70,10 @@ class EntryPoints:
     def keep_depth(self) -> None:
         """From now on clip space has 0 <= z <= w, and z / w is stored as it is."""
         self._clip_control(_LOWER_LEFT, _ZERO_TO_ONE)
+
+    def begin(self) -> None:
+        """Have what has been asked for so far begun, without waiting for it."""
+        self._flush()
 
     def make_float_depth(self, buffer: moderngl.Renderbuffer) -> None:
         """Give a depth buffer a storage of 32-bit floats."""

@@ -95,6 +95,10 @@ class GpuMesh:
             self._vertex_arrays[key] = self._context.vertex_array(program, attributes, index_buffer=index)
         return self._vertex_arrays[key]
 
+    def begin(self) -> None:
+        """Have what has been drawn so far begun, without waiting for it."""
+        self._calls.begin()
+
     def positions(self) -> moderngl.Buffer:
         """Local coordinates, three float32 a vertex."""
         mesh = self.mesh

@@ -18,6 +18,9 @@ _FACINGS: Final = 0
 _LEAVES: Final = 1
 _VALUES: Final = 2
 
+_PIECE: Final = 3 << 15
+"""Indices drawn at once: software OpenGL rasterises a piece on other cores while the next is set up."""
+
 BACK: Final = np.uint32(1 << 31)
 """Marks a black back in a target of identities."""
 
@@ -84,7 +87,10 @@ class GouraudPass(_MeshPass):
         self._look(scene, viewpoint)
         vertices = scene.vertex_array(self._program, (scene.buffer(name, values), "3f", "value"))
         self._clear(target)
-        vertices.render()
+        indices = scene.mesh.triangles.size
+        for first in range(0, indices, _PIECE):
+            vertices.render(first=first, vertices=min(_PIECE, indices - first))
+            scene.begin()
 
 
 class FlatPass(_MeshPass):
