@@ -18,8 +18,8 @@ _FACINGS: Final = 0
 _LEAVES: Final = 1
 _VALUES: Final = 2
 
-_PIECE: Final = 3 << 15
-"""Indices drawn at once: software OpenGL rasterises a piece on other cores while the next is set up."""
+_PIECE: Final = 1 << 15
+"""Triangles drawn at once: software OpenGL rasterises a piece on other cores while the next is set up."""
 
 BACK: Final = np.uint32(1 << 31)
 """Marks a black back in a target of identities."""
@@ -69,6 +69,15 @@ class _MeshPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
 
+    def _render(self, scene: GpuMesh, vertices: moderngl.VertexArray) -> None:
+        """Draw all triangles, piece by piece."""
+        count = len(scene.mesh.triangles)
+        for first in range(0, count, _PIECE):
+            if "first_triangle" in self._program:
+                self._set("first_triangle", first)
+            vertices.render(first=3 * first, vertices=3 * min(_PIECE, count - first))
+            scene.begin()
+
     def release(self) -> None:
         """Give the program back; the context must be current."""
         self._program.release()
@@ -87,10 +96,7 @@ class GouraudPass(_MeshPass):
         self._look(scene, viewpoint)
         vertices = scene.vertex_array(self._program, (scene.buffer(name, values), "3f", "value"))
         self._clear(target)
-        indices = scene.mesh.triangles.size
-        for first in range(0, indices, _PIECE):
-            vertices.render(first=first, vertices=min(_PIECE, indices - first))
-            scene.begin()
+        self._render(scene, vertices)
 
 
 class FlatPass(_MeshPass):
@@ -106,7 +112,7 @@ class FlatPass(_MeshPass):
         scene.leaf_values(is_radiance).bind_to_storage_buffer(_VALUES)
         vertices = scene.vertex_array(self._program)
         self._clear(target)
-        vertices.render()
+        self._render(scene, vertices)
 
 
 class IdentityPass(_MeshPass):
@@ -120,7 +126,7 @@ class IdentityPass(_MeshPass):
         self._look(scene, viewpoint)
         vertices = scene.vertex_array(self._program)
         self._clear(target)
-        vertices.render()
+        self._render(scene, vertices)
 
 
 class AccumulationPass:

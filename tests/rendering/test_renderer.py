@@ -11,6 +11,7 @@ from solver.document.samples import load_sample, sample_names
 from solver.errors import LimitExceededError, SceneError
 from solver.geometry.scene import Camera, Scene
 from solver.geometry.surfaces import Surfaces, flatten
+from solver.rendering import passes
 from solver.rendering.device import GlDevice
 from solver.rendering.geometry_layers import rays
 from solver.rendering.projection import pixel_pattern
@@ -225,6 +226,20 @@ def test_frames_follow_the_mesh_and_the_camera(renderer: FrameRenderer) -> None:
             frame: FloatArray = renderer.draw(mesh, view, Shading.GOURAUD, Layer.IRRADIANCE)
             values.append(float(frame[30, 40, 0]))
     np.testing.assert_allclose(values, [1.0, 1.0, 2.0, 2.0, 1.0, 1.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("shading", [Shading.FLAT, Shading.GOURAUD])
+@pytest.mark.parametrize("layer", [Layer.RADIANCE, Layer.TRIANGLE])
+def test_frames_drawn_in_pieces_are_those_drawn_at_once(
+    shading: Shading, layer: Layer, renderer: FrameRenderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surfaces = surfaces_of(polygons(SQUARE, two_sided=True))
+    mesh = Tessellator(surfaces).mesh(build_field(surfaces, even(3), linear((0.5, 0.3, 0.0), 1.0)))
+    at_once = renderer.draw(mesh, LOOK_DOWN, shading, layer)
+    assert len(np.unique(at_once)) > 7
+    for piece in (1, 7, len(mesh.triangles) - 1):
+        monkeypatch.setattr(passes, "_PIECE", piece)
+        np.testing.assert_array_equal(renderer.draw(mesh, LOOK_DOWN, shading, layer), at_once)
 
 
 @pytest.mark.parametrize("layer", sorted(set(Layer) - {Layer.ERROR}))
