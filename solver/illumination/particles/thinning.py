@@ -39,8 +39,8 @@ _BITS: Final = 14
 def thinned(lights: VirtualLights, surfaces: Surfaces, paths: int, seed: int = 0) -> VirtualLights:
     """As many of the `lights` of `lights.paths` paths as `paths` paths would have left; right in the mean.
 
-    On emitters those of the first `paths` paths are kept. Where lights are glossy there are up to twice as many
-    reflected ones.
+    On emitters those of the first `paths` paths are kept. Where lights are glossy there are up to twice as
+    many reflected ones.
     """
     if paths >= lights.paths:
         return lights
