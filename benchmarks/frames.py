@@ -1,12 +1,14 @@
 """Frames a second at 640x480: each renderer, with and without a file made of them, and the path tracer.
 
-The camera moves from frame to frame over a settled solution, as a viewer's does.
+The camera moves from frame to frame over a settled solution, as a viewer's does; and over one that changes,
+in its light or in its leaves too, as they do after an edit.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -18,11 +20,13 @@ from solver.document.samples import load_sample
 from solver.engine.drawing import encode
 from solver.engine.requests import CameraChoice, Encoding, LayerName
 from solver.geometry.scene import Camera
+from solver.geometry.surfaces import Surfaces
 from solver.pathtracing import PathTracer
 from solver.rendering.device import GlDevice
 from solver.rendering.encoding import PictureFormat
 from solver.rendering.renderer import FrameRenderer, Layer, Shading
 from solver.rendering.tessellation import Tessellator
+from solver.transport.field import RadiosityField
 from solver.transport.settings import SolverSettings
 from solver.types import AnyArray
 
@@ -38,6 +42,8 @@ _PATH_SAMPLES: Final = 4
 _STEP: Final = 0.01
 """Radians by which the camera goes round its target between two frames"""
 
+_Revision: TypeAlias = tuple[Surfaces, RadiosityField]
+
 
 @dataclass(frozen=True)
 class FrameFigures:
@@ -52,6 +58,10 @@ class FrameFigures:
     """Gouraud with 4 samples of a pixel"""
     jpeg: float
     """Gouraud, tone-mapped and encoded"""
+    new_light: float
+    """Gouraud, each frame of the same leaves in other light"""
+    new_leaves: float
+    """Gouraud, each frame after one object has moved with its leaves"""
     empty: float
     """Frames in which nothing is seen: what clearing and reading back take alone"""
     path: float
@@ -64,7 +74,8 @@ def measure_frames(name: str, seconds: float) -> FrameFigures:
     """Draw the default solution of a sample scene, each way for about `seconds`."""
     scene = load_sample(name)
     solved = solve_once(scene, SolverSettings())
-    mesh = Tessellator(solved.world.surfaces).mesh(solved.solver.field())
+    surfaces, field = solved.world.surfaces, solved.solver.field()
+    mesh = Tessellator(surfaces).mesh(field)
     renderer = FrameRenderer(GlDevice())
     camera = CameraChoice(width=WIDTH, height=HEIGHT).resolve(scene)
     away = replace(camera, eye=camera.eye + 1e3 * solved.world.surfaces.size * (camera.eye - camera.target))
@@ -81,6 +92,12 @@ def measure_frames(name: str, seconds: float) -> FrameFigures:
         "jpeg": calls_per_second(
             lambda k: encode(draw(Shading.GOURAUD, k), LayerName.RADIANCE, jpeg), seconds
         ),
+        "new_light": calls_per_second(
+            _in_turn(renderer, camera, (surfaces, field), _relit(surfaces, field)), seconds
+        ),
+        "new_leaves": calls_per_second(
+            _in_turn(renderer, camera, (surfaces, field), _edited(surfaces, field)), seconds
+        ),
         "empty": calls_per_second(
             lambda _: renderer.draw(mesh, away, Shading.GOURAUD, Layer.RADIANCE), seconds
         ),
@@ -94,6 +111,35 @@ def measure_frames(name: str, seconds: float) -> FrameFigures:
         path=_PATH_SAMPLES / path_seconds,
         path_rays=traced[0].ray_count / path_seconds,
         **rates,
+    )
+
+
+def _in_turn(renderer: FrameRenderer, camera: Camera, *revisions: _Revision) -> Callable[[int], AnyArray]:
+    """Draws the next revision with each call."""
+    tessellator = Tessellator(revisions[0][0])
+
+    def draw(number: int) -> AnyArray:
+        nonlocal tessellator
+        surfaces, field = revisions[number % len(revisions)]
+        if tessellator.surfaces is not surfaces:
+            tessellator = Tessellator(surfaces, tessellator)
+        return renderer.draw(tessellator.mesh(field), moved(camera, number), Shading.GOURAUD, Layer.RADIANCE)
+
+    return draw
+
+
+def _relit(surfaces: Surfaces, field: RadiosityField) -> _Revision:
+    """In a little more light."""
+    return surfaces, replace(field, irradiance=1.01 * field.irradiance, radiosity=1.01 * field.radiosity)
+
+
+def _edited(surfaces: Surfaces, field: RadiosityField) -> _Revision:
+    """With the object of fewest patches moved a little, and its leaves with it."""
+    is_moved = surfaces.object == np.argmin(np.bincount(surfaces.object))
+    offset = _STEP * surfaces.size * is_moved[:, None, None]
+    return (
+        replace(surfaces, corners=surfaces.corners + offset),
+        replace(field, corners=field.corners + offset[field.patch]),
     )
 
 
@@ -131,6 +177,8 @@ def _rows(figures: FrameFigures) -> list[Row]:
         ("gouraud", figures.gouraud, (target,)),
         ("gouraud, 4 samples", figures.four_samples, ()),
         ("gouraud as jpeg", figures.jpeg, ()),
+        ("gouraud, other light", figures.new_light, ()),
+        ("gouraud, one object moved", figures.new_leaves, ()),
         ("nothing in view", figures.empty, ()),
         (f"path, 1 sample, {figures.path_rays / 1e6:.1f} M rays / s", figures.path, ()),
     )

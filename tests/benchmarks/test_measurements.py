@@ -96,7 +96,8 @@ def test_frames_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(frames, "HEIGHT", 48)
     figures = frames.measure_frames("cornell", 0.03)
     assert min(figures.flat, figures.gouraud, figures.four_samples, figures.jpeg, figures.path) > 0.0
-    assert_whole(frames.tabulate([figures]), 6, "scene", "way", "frames / s")
+    assert figures.new_light > 0.0 and figures.new_leaves > 0.0
+    assert_whole(frames.tabulate([figures]), 8, "scene", "way", "frames / s")
 
 
 def test_patterns_are_measured() -> None:
