@@ -51,6 +51,7 @@ from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
 from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
+from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
 
@@ -82,6 +83,7 @@ class Engine:
         self._history = History()
         self._log = ChangeLog()
         self._turn = 0
+        self._memory = Memory()
         self._moved: ObjectId | None = None
         self._settle(World.of(scene), None, False)
 
@@ -151,8 +153,8 @@ class Engine:
         tracing = self._paths.step(share, self._settings.error_tolerance)
         if self._instant is not None:
             tracing = self._instant.step(share, self._settings.error_tolerance) or tracing
-        self._solution.step(0.5 * budget if tracing else budget)
-        return busy or tracing
+        remembering = self._solution.step(0.5 * budget if tracing else budget)
+        return busy or tracing or remembering
 
     def build_everything(self) -> None:
         """Build the interpolants of all triangles, seen or not, once there are any."""
@@ -258,7 +260,7 @@ class Engine:
 
     def _settle(self, world: World, earlier: Solution | None, drags: bool) -> None:
         """Let light settle in `world`, anew or from what it was `earlier`."""
-        solution = Solution(world, self._settings, earlier, self._revision, drags)
+        solution = Solution(world, self._settings, earlier, self._revision, drags, self._memory)
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
         if self._instant is not None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -12,6 +14,7 @@ from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.errors import SolverError
 from solver.geometry.surfaces import Surfaces
+from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.settings import SolverSettings
@@ -34,19 +37,25 @@ class Solution:
         earlier: Solution | None = None,
         number: int = 1,
         drags: bool = False,
+        memory: Memory | None = None,
     ) -> None:
         """Go on from `earlier`, the solution of an earlier revision, which is used up, unless it failed.
 
         `number` of the edit in between, which moves on what the one before moved, and nothing else, if it
-        `drags`.
+        `drags`. A solution that `memory` has is taken from there; it is shown this one when it has settled.
         """
         self.world = world
         self.solver: RadiositySolver | SampledSolver
         """Over links, or by samples where there are too many patches, which begins anew after every edit"""
         self._lent = False
         surfaces, rays = world.surfaces, world.rays
+        self._memory = memory or Memory(0)
+        self._remembering: Iterator[None] | None = None
         before = None if earlier is None else earlier.handed_over()
-        if surfaces.patch_count > MOST_LINKED:
+        recalled = self._memory.recall(surfaces, rays, settings)
+        if recalled is not None:
+            self.solver = recalled
+        elif surfaces.patch_count > MOST_LINKED:
             self.solver = SampledSolver(surfaces, rays, settings)
         elif before is None:
             self.solver = RadiositySolver(surfaces, rays, settings)
@@ -72,6 +81,8 @@ class Solution:
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; True while more work remains."""
+        if self.state is SessionState.CONVERGED:
+            return self._remember(budget)
         if self.state is not SessionState.SOLVING:
             return False
         try:
@@ -79,6 +90,14 @@ class Solution:
         except (SolverError, MemoryError) as failure:
             self._failure = failure
             return False
+
+    def _remember(self, budget: float) -> bool:
+        if not isinstance(self.solver, RadiositySolver):
+            return False
+        if self._remembering is None:
+            self._remembering = self._memory.remember(self.solver)
+        start = time.perf_counter()
+        return any(time.perf_counter() - start >= budget for _ in self._remembering)
 
     @property
     def state(self) -> SessionState:

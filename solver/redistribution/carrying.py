@@ -18,45 +18,50 @@ from solver.transport.state import TransportState
 from solver.types import FloatArray, IntArray
 
 
-def carry(state: TransportState, surfaces: Surfaces, match: Match) -> TransportState:
+def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) -> TransportState:
     """What `state` is in the scene of `surfaces`; its link table is handed over, not copied.
 
-    Links that may be blocked by patches that are gone must be in debt; those of such patches are removed.
-    Irradiance is right but for links that the edit has changed, and for fresh patches, whose irradiance is a
-    guess: what they received where they were before, or the ambient term.
+    Links that may be blocked by patches that are gone are in debt, or come into it by that to `edit`; those
+    of such patches are removed. Irradiance is right but for links that the edit has changed, and for fresh
+    patches, whose irradiance is a guess: what they received where they were before, or the ambient term.
     """
     tree, number = ElementTree.carried(surfaces, state.tree, match.number)
     links = state.links
     removed = np.flatnonzero((number[links.p] < 0) | (number[links.q] < 0)).astype(np.int32)
     lost = sent_over(state, removed)
-    links.forget(np.flatnonzero(links.debt).astype(np.int32), match.number)
+    if match.only_moves:
+        # Lists may hold patches that are near, but in no shaft; these are still there, if somewhere else.
+        links.forget_of(np.flatnonzero(links.debt).astype(np.int32), match.number)
+    else:
+        links.forget(match.number, edit)
     links.remove(removed)
     links.renumber(number, match.number)
 
     blank = TransportState.of(surfaces)
-    n, channels = len(tree), blank.channels
+    channels = blank.channels
+    # The earlier element that each one was; fresh ones take any, for now.
+    source = np.zeros(len(tree), dtype=np.int32)
+    kept = np.flatnonzero(number >= 0)
+    source[number[kept]] = kept
+    fresh = match.fresh
     after = replace(
         blank,
         tree=tree,
         links=links,
-        radiosity=np.zeros((n, 3, channels)),
-        received=np.zeros((n, 3, channels)),
-        closure=np.ones(n),
-        remainder=np.zeros((n, 3)),
+        radiosity=_in_channels(state, state.radiosity[source], channels),
+        received=_in_channels(state, state.received[source], channels),
+        closure=state.closure[source],
+        remainder=state.remainder[source],
         gathers=state.gathers,
     )
-    kept = np.flatnonzero(number >= 0)
-    to = number[kept]
-    after.closure[to] = state.closure[kept]
-    after.remainder[to] = state.remainder[kept]
-    after.radiosity[to] = _in_channels(state, state.radiosity[kept], channels)
-    after.received[to] = _in_channels(state, state.received[kept], channels)
+    after.closure[fresh] = 1.0
+    for functions in (after.radiosity, after.received, after.remainder):
+        functions[fresh] = 0.0
     if len(removed):
-        missing = np.zeros_like(after.received)
-        missing[to] = _in_channels(state, lost[kept], channels)
-        after.add_received(missing, -1.0)
+        lost = _in_channels(state, lost[source], channels)
+        lost[fresh] = 0.0
+        after.add_received(lost, -1.0)
     _repaint(state, after, match)
-    fresh = match.fresh
     known = match.likeness[fresh] >= 0
     after.received[fresh, 0] = blank.received[fresh, 0]
     if known.any():

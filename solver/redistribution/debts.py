@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.redistribution.matching import Match
-from solver.redistribution.reach import boxes_around, patch_hierarchy, reached_links
+from solver.redistribution.reach import boxes_around, reached_links
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.transport.state import TransportState
@@ -90,4 +90,4 @@ def _reached(
 ) -> IntArray:
     corners: FloatArray = tree.corners[: tree.patch_count]
     boxes = boxes_around(corners[patches], owner[patches])
-    return reached_links(tree, links, patch_hierarchy(corners), boxes, margin)
+    return reached_links(tree, links, boxes, margin)

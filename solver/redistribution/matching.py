@@ -32,6 +32,13 @@ class Match:
         stays[self.number[self.number >= 0]] = True
         return np.flatnonzero(~stays).astype(np.int32)
 
+    @property
+    def only_moves(self) -> bool:
+        """Whether all patches have the numbers that they had, wherever they are."""
+        return len(self.number) == len(self.likeness) and np.array_equal(
+            self.likeness, np.arange(len(self.likeness))
+        )
+
 
 def match_patches(before: Surfaces, after: Surfaces) -> Match:
     """What the patches of one revision are in the next."""

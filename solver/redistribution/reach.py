@@ -17,21 +17,17 @@ from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.types import BoolArray, ByteArray, Corners, FloatArray, IntArray
-from solver.visibility.bvh import Hierarchy, build_hierarchy
+from solver.visibility.bvh import build_hierarchy
 
 _CHUNK: Final = 1 << 15
 
 
-def reached_links(
-    tree: ElementTree, links: LinkTable, hierarchy: Hierarchy, boxes: FloatArray, margin: float
-) -> IntArray:
-    """Links (k,), ascending, whose light may pass through one of `boxes` (n, 2, 3), grown by `margin` metres.
-
-    `hierarchy` is over all patches of `tree`.
-    """
+def reached_links(tree: ElementTree, links: LinkTable, boxes: FloatArray, margin: float) -> IntArray:
+    """Links (k,), ascending, whose light may pass through `boxes` (n, 2, 3), grown by `margin` metres."""
     count = tree.patch_count
     met = np.zeros((count, count), dtype=np.uint8)
     corners = tree.corners[:count]
+    hierarchy = build_hierarchy(corners, np.arange(count, dtype=np.int32))
     low, high = corners.min(axis=1), corners.max(axis=1)
     for box in boxes:
         _reach_patches(
@@ -47,11 +43,6 @@ def reached_links(
 
     run_chunks(work, len(links), _CHUNK)
     return np.flatnonzero(found).astype(np.int32)
-
-
-def patch_hierarchy(corners: Corners) -> Hierarchy:
-    """The hierarchy over all patches (p, 4, 3), of either side."""
-    return build_hierarchy(corners, np.arange(len(corners), dtype=np.int32))
 
 
 def boxes_around(corners: Corners, owner: IntArray) -> FloatArray:

@@ -24,6 +24,7 @@ from solver.redistribution.carrying import carry, moments_of
 from solver.redistribution.debts import UnlinkedPairs, owe_for_coming, owe_for_leaving
 from solver.redistribution.energy import doubt_of, energies_at_stake, unshot_square
 from solver.redistribution.matching import Match, match_patches
+from solver.transport.coarsen import coarsen, unneeded
 from solver.transport.estimate import Residuals
 from solver.transport.field import RadiosityField
 from solver.transport.linking import Light
@@ -40,6 +41,12 @@ from solver.visibility.rays import RayScene
 
 _PROGRESS: Final = 0.5
 """Part of the progress that redistribution makes."""
+
+_CREEP: Final = 1.15
+"""Growth of the number of links at which all of them are looked at for mergers."""
+
+_FOLDED: Final = 0.03
+"""Elements without links are folded back when they are more than this share of all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +92,14 @@ class Redistribution(RadiositySolver):
         margin = 2.0 * tolerances.SIDE * max(surfaces.size, earlier.surfaces.size)
         state = earlier.hand_over()
         owe_for_leaving(state, match, number, margin, drags)
-        self._state = carry(state, surfaces, match)
+        self._state = carry(state, surfaces, match, number)
         owe_for_coming(self._state, match, number, margin)
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
         self.bound = earlier.bound
         self.linked = surfaces.patch_count
+        self.lean: int = earlier.lean if isinstance(earlier, Redistribution) else len(earlier.state.links)
+        """Links when all of them were last looked at for mergers"""
         self._known_error = earlier.error_estimate
         self.error_estimate = 1.0
         self.recent = self._fresh_since(match, earlier)
@@ -177,15 +186,33 @@ class Redistribution(RadiositySolver):
         state.radiosity = state.reflectance[patch][:, None] * state.received
         state.radiosity[:, 0] += state.emission[patch]
         residuals = Residuals.of(state)
-        rows = self._new
+        yield True
+        full = len(state.links) > _CREEP * self.lean
+        tried = np.arange(len(state.links), dtype=np.int32) if full else self._new
+        work = coarsen(state, self._linker, self._pace, tried, residuals, self.bound)
         while True:
-            choice = choose_above(state, rows, residuals.estimate(state, rows), self.settings, self.bound)
+            try:
+                next(work)
+            except StopIteration as end:
+                rows: IntArray = end.value
+                break
+            yield True
+        if full:
+            self.lean = len(state.links)
+        while True:
+            estimate = residuals.estimate(state, state.links.take(rows))
+            choice = choose_above(state, rows, estimate, self.settings, self.bound)
             yield True
             if not isinstance(choice, Choice):
-                return
+                break
             rows = yield from self._refine(residuals.light, choice)
             rows.sort()
             residuals = residuals.grown(state, rows)
+        gone = unneeded(state.tree, state.links)
+        if gone.sum() > _FOLDED * len(gone):
+            state.fold(gone)
+            self.version += 1
+            yield True
 
     def _make_plan(self) -> _Plan:
         """All debts in the order of the energy at stake; `_unlinked` gets into that order too."""

@@ -1,11 +1,12 @@
 """Row sums of form factors: never above 1, and exactly 1 in a closed scene.
 
 Form factors of an enclosure sum to 1 from every element; sampled visibility and tolerances leave errors
-of parts in a thousand, which reflectances near 1 would amplify a hundredfold. The sums are restored by
-symmetric scaling, G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity, and the rest and
-the gradient that a leaf would see in a uniform field by coupling it with itself. In an open scene the row
-sums are what they are, but for patches where they are above 1 on average. Whether a scene
-is closed is asked of rays: if `PROBES` cosine-distributed rays, spread over the surfaces by area, all
+of parts in a thousand, which reflectances near 1 would amplify a hundredfold. The sums are restored, and so
+is the lack of a gradient in a uniform field, by coupling each leaf with itself. Scaling its links instead
+would let those that carry no light, and may be coarse, change those that carry all of it. In an open scene
+the row sums are what they are, but for patches where they are above 1 on average: these are scaled down,
+G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity. Whether a scene is closed is asked of
+rays: if `PROBES` cosine-distributed rays, spread over the surfaces by area, all
 end on fronts, at most about 3 / PROBES of the light can escape unseen (95 % confidence).
 """
 
@@ -27,9 +28,6 @@ PROBES: Final = 16384
 _STEPS: Final = 2
 _MOST_REFLECTED: Final = 0.995
 """Where balance is strict, no leaf reflects more than this share of a uniform field."""
-
-_LEAST_SUM: Final = 0.25
-"""A row sum below this is no matter of scale."""
 
 
 def is_closed(surfaces: Surfaces, rays: RayScene) -> bool:
@@ -89,12 +87,10 @@ def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterat
     unit = np.zeros((n, 3, 1))
     unit[:, 0] = 1.0
     highest = state.reflectance.max(axis=1)[tree.patch]
-    for _ in range(_STEPS):
+    for _ in range(0 if closed else _STEPS):
         row_sum = (yield from state.gather_in_steps(unit))[:, 0, 0]
         yield
-        if closed:
-            target = np.where(leaf & (row_sum > _LEAST_SUM), 1.0, row_sum)
-        elif strict:
+        if strict:
             target = np.where(
                 leaf, np.minimum(row_sum, _MOST_REFLECTED / np.maximum(highest, 1e-300)), row_sum
             )

@@ -9,14 +9,14 @@ axes of its patch. Hence its centroid, its second moments and its place in its p
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
 from solver.transport.subdivision import count_children, make_children, place_elements
-from solver.types import Corners, FloatArray, IntArray, Points
+from solver.types import BoolArray, Corners, FloatArray, IntArray, Points
 
 _COPIED: Final = ("corners", "corner_count", "child_count", "area", "centroid", "moment", "offset")
 """What a patch's elements keep when others come and go; the rest are numbers of patches and elements."""
@@ -154,6 +154,28 @@ class ElementTree:
         self.child_count[ids] = counts
         make_children(ids, first, counts, self.corners, self.corner_count, self.patch, self.parent, self.area)
         self._place(len(self) - total)
+
+    def without(self, gone: BoolArray) -> tuple[ElementTree, IntArray]:
+        """The tree without the elements `gone` (n,), all children of an element or none, and all below them.
+
+        Returns the new number of each element (n,) too, -1 where it is gone.
+        """
+        tree = object.__new__(ElementTree)
+        tree.patch_count, tree.patch_normal, tree.axes = self.patch_count, self.patch_normal, self.axes
+        kept = np.flatnonzero(~gone)
+        number = np.full(len(self), -1, dtype=np.int32)
+        number[kept] = np.arange(len(kept), dtype=np.int32)
+        for name in (*_COPIED, "patch", "parent", "child"):
+            mine: GrowingArray[Any] = getattr(self, f"_{name}")
+            column = GrowingArray(mine.live.shape[1:], mine.live.dtype.type, len(kept) + len(kept) // 16)
+            column.append(mine.live[kept])
+            setattr(tree, f"_{name}", column)
+        inner = tree.parent >= 0
+        tree.parent[inner] = number[tree.parent[inner]]
+        split = tree.child >= 0
+        tree.child[split] = number[tree.child[split]]
+        tree.child_count[tree.child < 0] = 0
+        return tree, number
 
     @staticmethod
     def carried(surfaces: Surfaces, earlier: ElementTree, patch: IntArray) -> tuple[ElementTree, IntArray]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.parallel import run_chunks
 from solver.transport.linking import Light
+from solver.transport.links import LinkBatch, LinkTable
 from solver.transport.oracle import (
     RESAMPLE,
     SPLIT_P,
@@ -112,16 +113,18 @@ class Residuals:
             np.concatenate([self.bias, self.bias[parent]]),
         )
 
-    def estimate(self, state: TransportState, rows: IntArray | slice = slice(None)) -> ErrorEstimate:
-        """The errors of the links `rows` (n,), or of all.
+    def estimate(self, state: TransportState, links: LinkTable | LinkBatch | None = None) -> ErrorEstimate:
+        """The errors of the given links (n,), or of all that there are.
 
         Emission is known and would only dilute a relative error, so that the norm leaves it out.
         """
-        tree, links = state.tree, state.links
+        tree = state.tree
+        if links is None:
+            links = state.links
         leaf = tree.child < 0
         resolved = np.where(leaf, LEAF, 1.0)
-        p, q, exchange, noise = links.p[rows], links.q[rows], links.open_exchange[rows], links.noise[rows]
-        residual_p, residual_q = links.residual_p[rows], links.residual_q[rows]
+        p, q, exchange, noise = links.p, links.q, links.open_exchange, links.noise
+        residual_p, residual_q = links.residual_p, links.residual_q
         errors = np.empty((3, len(p)))
         mean, reflectance = self.light.radiosity, self.light.reflectance
 

@@ -171,8 +171,9 @@ class Linker:
         parent_pool: IntArray,
         least_samples: IntArray,
         light: Light,
+        keep_dark: bool = False,
     ) -> LinkBatch:
-        """Links between elements whose parents' link has the blockers given."""
+        """Links between elements that have no other blockers than those given, as of their parents' link."""
         n = len(p)
         kind, kept = np.empty(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
         room = np.cumsum(parent_count, dtype=np.int64) - parent_count
@@ -187,7 +188,9 @@ class Linker:
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)
-        return self._evaluate(tree, p, q, kind, kept, take_ranges(loose, room, kept), least_samples, light)
+        return self._evaluate(
+            tree, p, q, kind, kept, take_ranges(loose, room, kept), least_samples, light, keep_dark
+        )
 
     def _evaluate(
         self,

@@ -6,7 +6,7 @@ that holds the one and an element that holds the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ import numpy as np
 from solver.arrays import GrowingArray
 from solver.kernels import kernel
 from solver.parallel import run_chunks
+from solver.transport.pace import finish
 from solver.types import FloatArray, Int64Array, IntArray
 
 _POOLED: Final = 1 << 21
@@ -54,6 +55,14 @@ class LinkBatch:
     """(n,) length of each blocker list"""
     blockers: IntArray
     """all lists, one after the other: patches"""
+
+    def chosen(self, rows: Int64Array) -> LinkBatch:
+        """The links `rows` (k,) of these."""
+        start = np.cumsum(self.blocker_count, dtype=np.int64) - self.blocker_count
+        columns = {name: getattr(self, name)[rows] for name in _COLUMNS}
+        return LinkBatch(
+            **columns, blockers=take_ranges(self.blockers, start[rows], self.blocker_count[rows])
+        )
 
     @staticmethod
     def joined(batches: Sequence[LinkBatch]) -> LinkBatch:
@@ -244,9 +253,23 @@ class LinkTable:
             pool = self.pool
             run_chunks(lambda start, stop: _renumber(pool, patch, start, stop), len(pool), 1 << 18)
 
-    def forget(self, rows: IntArray, patch: IntArray) -> None:
-        """Put -1 in the place of blockers of `rows` that have no new number in `patch` (p,)."""
-        _forget(self.pool, self.blocker_start[rows], self.blocker_count[rows], patch)
+    def forget(self, patch: IntArray, number: int) -> None:
+        """Put -1 in the place of blockers that have no new number in `patch` (p,).
+
+        Links that have such a blocker and no debt come into debt to edit `number`.
+        """
+
+        def work(start: int, stop: int) -> None:
+            _forget(self.pool, self.blocker_start, self.blocker_count, self.debt, patch, number, start, stop)
+
+        run_chunks(work, len(self), 1 << 14)
+
+    def forget_of(self, rows: IntArray, patch: IntArray) -> None:
+        """The same for `rows` (n,) alone, which are in debt."""
+        debt = np.ones(len(rows), dtype=np.int32)
+        _forget(
+            self.pool, self.blocker_start[rows], self.blocker_count[rows], debt, patch, 1, 0, len(rows)
+        )  # fmt: skip
 
     def remove(self, gone: IntArray) -> None:
         """Take out the rows `gone` (n,), ascending. The last ones fill their places."""
@@ -261,9 +284,18 @@ class LinkTable:
 
     def copy(self) -> LinkTable:
         """The same links in arrays of their own."""
+        return finish(self.copy_in_steps())
+
+    def copy_in_steps(self) -> Generator[None, None, LinkTable]:
+        """As `copy`; yields every few milliseconds. The table must not change meanwhile."""
         other = LinkTable(len(self))
-        for name in (*_OWN, "pool"):
+        other._pool = GrowingArray((), np.int32, len(self._pool))
+        for name in _OWN:
             getattr(other, f"_{name}").append(getattr(self, name))
+            yield
+        for start in range(0, len(self._pool), _POOLED):
+            other._pool.append(self.pool[start : start + _POOLED])
+            yield
         return other
 
     def _fill(self, holes: IntArray) -> None:
@@ -311,11 +343,22 @@ def take_ranges(values: IntArray, start: Int64Array, count: IntArray) -> IntArra
 
 
 @kernel
-def _forget(pool: IntArray, start: Int64Array, count: IntArray, patch: IntArray) -> None:
-    for k in range(len(start)):
-        for i in range(start[k], start[k] + count[k]):
+def _forget(
+    pool: IntArray,
+    begin: Int64Array,
+    count: IntArray,
+    debt: IntArray,
+    patch: IntArray,
+    number: int,
+    start: int,
+    stop: int,
+) -> None:
+    for k in range(start, stop):
+        for i in range(begin[k], begin[k] + count[k]):
             if pool[i] >= 0 and patch[pool[i]] < 0:
                 pool[i] = -1
+                if debt[k] == 0:
+                    debt[k] = number
 
 
 @kernel

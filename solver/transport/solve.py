@@ -94,7 +94,7 @@ class RadiositySolver(SlicedSolve):
         self.linked = 0
         """Patches that are linked with all that come after them"""
         self.bound = 0.0
-        """Least squared error of a link that the last round of refinement dealt with"""
+        """Squared error of a link, times area, that is refined at this tolerance: of the last round"""
 
     @property
     def state(self) -> TransportState:
@@ -113,6 +113,15 @@ class RadiositySolver(SlicedSolve):
     def keep_a_copy(self) -> None:
         """Let those that read the state keep it as it is: what is handed over is another one."""
         self._handed = replace(self._state, links=self._state.links.copy())
+
+    def again(self, surfaces: Surfaces, rays: RayScene, state: TransportState) -> RadiositySolver:
+        """A solver of the same scene that has settled already, with the light of `state`."""
+        other = RadiositySolver(surfaces, rays, self.settings)
+        other._state = replace(state, surfaces=surfaces)
+        other._closed, other.bound, other.linked = self._closed, self.bound, surfaces.patch_count
+        other.error_estimate, other.unshot_fraction = self.error_estimate, self.unshot_fraction
+        other.progress, other.outcome = 1.0, SolveOutcome.CONVERGED
+        return other
 
     def statistics(self) -> SolverStatistics:
         """Counts at this moment."""
@@ -185,6 +194,9 @@ class RadiositySolver(SlicedSolve):
             self._report_progress()
             yield True
             if estimate.relative <= tolerance:
+                # Where less was left than aimed at, links may err by more another time.
+                room = _AIM * tolerance / max(estimate.relative, 0.5 * tolerance)
+                self.bound *= max(1.0, room) ** 2
                 for _ in state.links.trim():
                     yield True
                 if self.error_estimate > tolerance:

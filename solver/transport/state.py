@@ -10,8 +10,8 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
-from solver.transport.pushpull import irradiance, irradiance_in_steps, push
-from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Spectra
+from solver.transport.pushpull import irradiance, irradiance_in_steps, pull, push
+from solver.types import LUMINANCE_WEIGHTS, BoolArray, FloatArray, IntArray, Spectra
 
 
 @dataclass(eq=False)
@@ -101,6 +101,33 @@ class TransportState:
             setattr(self, name, np.concatenate([functions, fresh]))
         self.closure = np.concatenate([self.closure, self.closure[parent]])
         self.remainder = np.concatenate([self.remainder, np.zeros((len(parent), 3))])
+
+    def fold(self, gone: BoolArray) -> None:
+        """Let elements (n,) go that have no links; parents whose children go have the light of those."""
+        heads = np.flatnonzero((self.tree.child >= 0) & gone[self.tree.child] & ~gone).astype(np.int32)
+        for name in ("radiosity", "received"):
+            functions: FloatArray = getattr(self, name)
+            functions[heads] = linear_functions(self.tree, functions, heads)
+        self.tree, number = self.tree.without(gone)
+        kept = np.flatnonzero(number >= 0)
+        for name in ("radiosity", "received", "closure", "remainder"):
+            setattr(self, name, getattr(self, name)[kept])
+        self.remainder[number[heads]] = 0.0
+        self.closure[number[heads]] = 1.0
+        self.links.renumber(number, np.arange(self.tree.patch_count, dtype=np.int32))
+
+
+def linear_functions(tree: ElementTree, functions: FloatArray, elements: IntArray) -> FloatArray:
+    """The linear functions (k, 3, channels) closest to those on the leaves below `elements` (k,)."""
+    moments = np.empty_like(functions)
+    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, functions, moments)
+    found = moments[elements]
+    uu, uv, vv = (tree.moment[elements, k, None] for k in range(3))
+    determinant = uu * vv - uv * uv
+    u, v = found[:, 1].copy(), found[:, 2].copy()
+    found[:, 1] = (vv * u - uv * v) / determinant
+    found[:, 2] = (uu * v - uv * u) / determinant
+    return found
 
 
 def _ambient(area: FloatArray, emission: Spectra, reflectance: Spectra) -> FloatArray:

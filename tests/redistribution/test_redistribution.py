@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from solver.transport.field import SolveOutcome
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
 from tests.pathtracing.worlds import CUBE, OUTWARD, material
+from tests.redistribution.rooms import crate, difference, edited, fresh, placed, room, settled
 from tests.transport.solving import DEFAULT, finish, lit_cube, shelf, solved, solver_of
 
 
@@ -88,3 +91,81 @@ def test_nothing_in_common() -> None:
     }
     scene = World.of(type(other.scene)(objects=renamed))
     assert_same_light(finish(warm(scene, solved(shelf()))), solved(other))
+
+
+def bytes_of(solver: RadiositySolver) -> tuple[int, int, int]:
+    statistics = solver.statistics()
+    return statistics.elements, statistics.links, statistics.memory_bytes
+
+
+def test_sessions_of_many_edits_do_not_fill_up() -> None:
+    """Each settled before the next: what the shadows of places long left needed is folded back."""
+    random = np.random.default_rng(3)
+    scene = room().with_object(crate("a", (1.0, 1.0, 0.3))).with_object(crate("b", (3.0, 2.0, 0.0)))
+    solver = settled(fresh(scene))
+    for number in range(1, 31):
+        at = random.uniform((0.1, 0.1, 0.02), (3.2, 2.2, 1.5))
+        scene = scene.with_replaced(replace(scene.object("a"), transform=placed(at)))
+        solver = settled(edited(solver, scene, number))
+    anew = settled(fresh(scene))
+    for now, then in zip(bytes_of(solver), bytes_of(anew), strict=True):
+        assert now < 1.6 * then
+
+
+def test_an_interrupted_first_solve_goes_on() -> None:
+    """Pairs that were not linked yet when an edit came are linked by the next revision."""
+    scene = room()
+    begun = fresh(scene)
+    begun.step(0.0)
+    assert begun.linked < begun.surfaces.patch_count
+    furnished = scene.with_object(crate("a", (1.0, 1.0, 0.0)))
+    after = edited(begun, furnished)
+    assert difference(settled(after), settled(fresh(furnished))) < 0.05
+
+
+def test_the_energy_owed_falls_and_the_greatest_goes_first() -> None:
+    before = settled(fresh(room()))
+    after = edited(before, room().with_object(crate("a", (1.8, 1.2, 0.5))), number=7)
+    owed = after.owed()
+    assert set(owed) == {7}
+    assert owed[7] > 0.0
+    left = [owed[7]]
+    while after.owes:
+        after.step(0.0)
+        left.append(after.owed().get(7, 0.0))
+    steps = -np.diff(left)
+    assert np.all(steps >= -1e-12)
+    assert left[-1] == 0.0
+    assert after.shots > 0
+
+
+def test_places_that_a_drag_has_passed_leave_no_debt() -> None:
+    """Two hundred moves cost one removal and one addition."""
+    scene = room().with_object(crate("a", (1.0, 1.0, 0.3)))
+    solver: RadiositySolver = settled(fresh(scene))
+    first = None
+    for number in range(1, 201):
+        at = (0.2 + 0.014 * number, 1.0, 0.3)
+        scene = scene.with_replaced(replace(scene.object("a"), transform=placed(at)))
+        solver = edited(solver, scene, number, drags=number > 1)
+        if first is None:
+            first = int(np.count_nonzero(solver.state.links.debt))
+    last = int(np.count_nonzero(solver.state.links.debt))
+    direct = edited(settled(fresh(room().with_object(crate("a", (1.0, 1.0, 0.3))))), scene, 1)
+    assert last == np.count_nonzero(direct.state.links.debt)
+    assert difference(settled(solver), settled(fresh(scene))) < 0.05
+
+
+def test_the_error_is_told_while_light_follows() -> None:
+    """A lamp that moves changes everything, and nobody is told that the light is right before it is."""
+    before = settled(fresh(room()))
+    scene = room()
+    moved = scene.with_replaced(replace(scene.object("lamp"), transform=placed((1.2, 0.8, -0.5))))
+    truth = settled(fresh(moved))
+    after = edited(before, moved)
+    assert after.error_estimate == 1.0
+    told = []
+    while after.step(0.0):
+        told.append((after.error_estimate, difference(after, truth)))
+    early = told[: len(told) // 3]
+    assert all(estimate >= 0.8 * error for estimate, error in early)
