@@ -28,7 +28,7 @@ KEPT: Final = 4
 """Frames kept at once; a new camera takes the place of the one asked for longest ago."""
 
 MOST_POINTS: Final = 2**23
-"""Points of all frames kept, about 300 bytes each, unless a single frame has more."""
+"""Points of all frames kept, about 200 bytes each, unless a single frame has more."""
 
 MOST_SAMPLES: Final = 16
 """Of a pixel: all of them are kept."""
