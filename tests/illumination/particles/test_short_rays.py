@@ -109,3 +109,20 @@ def test_rays_one_after_the_other_have_nothing_to_do_with_each_other(stream: int
     found = [directions(FLOOR, 2000, bounce, stream) - [0.0, 0.0, 2.0 / 3.0] for bounce in range(4)]
     for first, second in combinations(found, 2):
         np.testing.assert_allclose(first.T @ second / len(first), 0.0, atol=0.03)
+
+
+def test_pairs_of_rays_err_less_than_random_ones() -> None:
+    """Means over 64 turns of what two rays in a row decide together, for each of 400 points."""
+    of = room(square("floor", material(0.5), z=0.0))
+    short, turns, count = ShortRays(of.surfaces, of.rays, 1.0, has_mirrors=False), 64, 400
+    at, patch = np.full((count, 3), 0.5), np.zeros(count, dtype=np.int32)
+    stream: Int64Array = np.arange(count, dtype=np.int64)
+    least = np.zeros(of.surfaces.patch_count)
+    values = np.empty((turns, count))
+    for turn in range(turns):
+        one, two = (short.send(at, patch, stream, turn, bounce, least).directions for bounce in (0, 1))
+        # Squares of components have means of 1/4 and 1/2, and of their products 1/8.
+        values[turn] = one[:, 0] ** 2 * two[:, 2] ** 2
+    error = np.sqrt(np.mean((values.mean(axis=0) - 0.125) ** 2))
+    assert abs(values.mean() - 0.125) < 0.002
+    assert error < 0.6 * values.std() / np.sqrt(turns)
