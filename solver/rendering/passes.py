@@ -73,10 +73,11 @@ class _MeshPass:
         """Draw all triangles, piece by piece."""
         count = len(scene.mesh.triangles)
         for first in range(0, count, _PIECE):
+            if first > 0:
+                scene.begin()
             if "first_triangle" in self._program:
                 self._set("first_triangle", first)
             vertices.render(first=3 * first, vertices=3 * min(_PIECE, count - first))
-            scene.begin()
 
     def release(self) -> None:
         """Give the program back; the context must be current."""
