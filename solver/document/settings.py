@@ -10,6 +10,7 @@ from pydantic import Field
 from solver.document.fields import Closed
 from solver.illumination.particles.sights import MOST_RESOLUTION
 from solver.illumination.settings import Compensation, LightSettings
+from solver.transport.settings import Interleaving
 
 _DEFAULTS = LightSettings()
 
@@ -38,6 +39,11 @@ class SettingsDocument(Closed):
     relative_cutoff: Annotated[_Positive, Field(lt=1.0)] | None = Field(
         default=None,
         description="The solve is done when the unshot radiosity is at most this fraction of all.",
+    )
+    interleaving: Interleaving = Field(
+        default=_DEFAULTS.interleaving,
+        description="What comes first after an edit: `redistribute_first`, the object and its shadow, or "
+        "`by_energy`, whatever moves more energy.",
     )
     max_elements: _Count = Field(
         default=_DEFAULTS.max_elements, description="Elements after which refinement stops, with a warning."

@@ -12,7 +12,7 @@ energy at stake. Another edit may interrupt at any time: it takes over what is s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -31,7 +31,7 @@ from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.pushpull import gather, means
 from solver.transport.refine import NOISE_SHARE, Choice, choose_above
-from solver.transport.settings import SolverSettings
+from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
 from solver.transport.state import TransportState
 from solver.types import BoolArray, FloatArray, IntArray
@@ -41,6 +41,12 @@ from solver.visibility.rays import RayScene
 
 _PROGRESS: Final = 0.5
 """Part of the progress that redistribution makes."""
+
+_THRESHOLD: Final = 0.05
+"""Share of the energy below which redistribution does not come first any more."""
+
+_SHOTS_A_GATHER: Final = 0.02
+"""Links that are looked at between two propagations, of all."""
 
 _CREEP: Final = 1.15
 """Growth of the number of links at which all of them are looked at for mergers."""
@@ -156,6 +162,7 @@ class Redistribution(RadiositySolver):
         # What has been shot is as uncertain as what has not, until it is propagated.
         self.error_estimate = min(1.0, math.hypot(self._known_error, plan.doubt))
         changed: list[IntArray] = []
+        since = 0
         old = len(state.links)
         yield True
         for part in self._pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
@@ -169,6 +176,11 @@ class Redistribution(RadiositySolver):
             self._guessed_now = self.unshot_fraction = share = plan.share_left(part.stop)
             self.progress = _PROGRESS * (1.0 - share)
             yield True
+            since += part.stop - part.start
+            if self._is_propagations_turn(share, since):
+                since = 0
+                if self._unshot() > float(plan.left[part.stop]):
+                    moments = yield from self._propagate()
         self._take_in()
         self._arrived = None
         unshot, scale = unshot_square(state)
@@ -176,6 +188,43 @@ class Redistribution(RadiositySolver):
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
         self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
         yield from self._refine_as_before()
+
+    def _is_propagations_turn(self, share: float, since: int) -> bool:
+        """Whether propagation may come now, `since` shots after the last; `share` of the energy is at stake.
+
+        A propagation is a gather over all links, so that there are some redistribution shots to each.
+        """
+        if self.settings.interleaving is Interleaving.REDISTRIBUTE_FIRST and share > _THRESHOLD:
+            return False
+        return since >= _SHOTS_A_GATHER * len(self._state.links)
+
+    def _unshot(self) -> float:
+        """W of luminance that has arrived and is not propagated."""
+        self._take_in()
+        state = self._state
+        leaves = state.tree.leaves
+        patch = state.tree.patch[leaves]
+        unshot = state.emission[patch] + state.reflectance[patch] * state.received[leaves, 0]
+        unshot -= state.radiosity[leaves, 0]
+        return float(state.tree.area[leaves] @ np.abs(unshot @ state.weights))
+
+    def _propagate(self) -> Generator[bool, None, FloatArray]:
+        """Shoot all that has arrived. Returns the moments of what elements send from now on."""
+        state = self._state
+        patch = state.tree.patch
+        radiosity = state.reflectance[patch][:, None] * state.received
+        radiosity[:, 0] += state.emission[patch]
+        work = state.gather_in_steps(radiosity - state.radiosity)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                state.received += end.value
+                break
+            yield True
+        state.radiosity = radiosity
+        self.version += 1
+        return moments_of(state)
 
     def _refine_as_before(self) -> Iterator[bool]:
         """Refine what is new until it errs no more than what was there, in the light that has arrived."""
@@ -227,7 +276,11 @@ class Redistribution(RadiositySolver):
             p, q, np.concatenate([links.open_exchange[rows], np.zeros(len(pairs))]), tree.area, tree.centroid,
             tree.patch, self.surfaces.normal, radiosity, reflectance, energy,
         )  # fmt: skip
-        order = np.argsort(-energy, kind="stable")
+        # What an emitter sends out that came with the edit is what everybody looks at.
+        first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
+        first[self._fresh] = state.emission[self._fresh].any(axis=1)
+        lit = first[tree.patch[p]] | first[tree.patch[q]]
+        order = np.lexsort((-energy, ~lit))
         paired = order[order >= len(rows)] - len(rows)
         self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
         _, scale = unshot_square(state)

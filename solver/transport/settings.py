@@ -6,6 +6,16 @@ These are parameters 1, 2 and 7 of [H appendix A]; parameter 3 (roundoff) is `so
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Interleaving(StrEnum):
+    """What comes first after an edit: light that is redistributed, or light that is propagated."""
+
+    REDISTRIBUTE_FIRST = "redistribute_first"
+    """The object and its shadow first, what it changes elsewhere later ([G] strategy one)"""
+    BY_ENERGY = "by_energy"
+    """Whatever moves more energy ([G] strategy two)"""
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,9 @@ class SolverSettings:
     relative_cutoff: float | None = None
     """[H A.7] The iteration stops when the unshot radiosity is at most this fraction of what is
     reflected; None: derived."""
+    interleaving: Interleaving = Interleaving.REDISTRIBUTE_FIRST
+    """[G "Interleaving redistribution and propagation shots"] The order of work after an edit; where it
+    leads to is the same."""
     max_elements: int = 400_000
     """Elements (leaves and inner nodes) after which refinement stops with a warning."""
     max_links: int = 6_000_000

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from solver.engine.world import World
-from solver.geometry.scene import Mesh, SceneObject
+from solver.geometry.scene import Mesh, Scene, SceneObject
 from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import SolveOutcome
+from solver.transport.settings import Interleaving
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
 from tests.pathtracing.worlds import CUBE, OUTWARD, material
-from tests.redistribution.rooms import crate, difference, edited, fresh, placed, room, settled
+from tests.redistribution.rooms import SETTINGS, crate, difference, edited, fresh, placed, room, settled
 from tests.transport.solving import DEFAULT, finish, lit_cube, shelf, solved, solver_of
 
 
@@ -169,3 +170,34 @@ def test_the_error_is_told_while_light_follows() -> None:
         told.append((after.error_estimate, difference(after, truth)))
     early = told[: len(told) // 3]
     assert all(estimate >= 0.8 * error for estimate, error in early)
+
+
+@pytest.mark.parametrize("interleaving", Interleaving)
+def test_both_orders_of_work_lead_to_the_same_light(interleaving: Interleaving) -> None:
+    settings = replace(SETTINGS, interleaving=interleaving)
+    scene = room((0.7, 0.5, 0.3)).with_object(crate("a", (1.0, 1.0, 0.3)))
+    moved = scene.with_replaced(replace(scene.object("a"), transform=placed((2.2, 1.1, 0.8))))
+    after = settled(edited(settled(fresh(scene, settings)), moved))
+    assert after.outcome is SolveOutcome.CONVERGED
+    assert difference(after, settled(fresh(moved, settings))) < 0.05
+
+
+def test_a_lamp_that_comes_shoots_first() -> None:
+    scene = room()
+    lamp = replace(crate("new", (0.5, 0.5, 0.5), 0.1), material=material(0.0, 200.0))
+    after = edited(settled(fresh(scene)), scene.with_object(lamp))
+    after.owed()
+    plan, count = after._plan, after.surfaces.patch_count
+    assert plan is not None
+    rows = plan.rows
+    last_pair = np.flatnonzero(rows < 0).max()
+    assert last_pair < len(rows) - 1 or np.all(rows < 0)
+    new = after.surfaces.object_ids.index("new")
+    ends = np.stack([after.unlinked.p, after.unlinked.q])
+    assert np.all((after.surfaces.object[ends] == new).any(axis=0)), "all pairs are the lamp's"
+    assert np.all(rows[: len(after.unlinked)] < 0), "and come before all links"
+    assert count == scene_patches(scene) + 6
+
+
+def scene_patches(scene: Scene) -> int:
+    return fresh(scene).surfaces.patch_count
