@@ -205,17 +205,18 @@ class InstantFrame:
                     image.gloss[sample][:, glossy.broad] += light
                 yield
         if self._settings.compensates and np.isfinite(bound):
-            yield from self._compensate(image, block, self._nearby(block, HELPERS))
+            yield from self._compensate(image, block)
         if any(len(glossy.narrow) > 0 for glossy in self._glossy):
-            yield from self._send_lobes(image, block, self._nearby(block, _LOBE_HELPERS))
+            yield from self._send_lobes(image, block)
 
-    def _nearby(self, block: LightBlock, helpers: int) -> NearbyLight:
+    def _nearby(self, block: LightBlock, helpers: int, sample: int) -> NearbyLight:
         """What rays of a block come upon, by so many batches, and what its lights leave out."""
         bound = self._settings.bound
+        which = (sample, len(self._points))
         reach_bound = bound if self._settings.compensates else np.inf
-        return nearby_light(self._blocks, block, bound, reach_bound, self._known(), helpers)
+        return nearby_light(self._blocks, block, bound, reach_bound, self._known(), helpers, which)
 
-    def _compensate(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
+    def _compensate(self, image: Image, block: LightBlock) -> Iterator[None]:
         """Add what its lights leave out, by a ray for every `PATHS_PER_RAY` paths, over all samples.
 
         Of blocks with fewer paths neighbours share a ray, another's each time.
@@ -223,6 +224,7 @@ class InstantFrame:
         rays = max(1, round(block.paths / (PATHS_PER_RAY * len(self._points))))
         every = max(1, round(PATHS_PER_RAY * len(self._points) / block.paths))
         for sample, points in enumerate(self._points):
+            near = self._nearby(block, HELPERS, sample)
             for ray in range(rays):
                 turn = self._turn + ray
                 start, asked = shared_rays(points.patch, every, self._turn)
@@ -246,13 +248,13 @@ class InstantFrame:
         pixels = self.camera.width * self.camera.height
         return self._points[sample].keys(pixels, rows) * len(self._points) + sample
 
-    def _send_lobes(self, image: Image, block: LightBlock, near: NearbyLight) -> Iterator[None]:
+    def _send_lobes(self, image: Image, block: LightBlock) -> Iterator[None]:
         """Find the light of narrow lobes, by one ray for every `PATHS_PER_LOBE` paths, over all samples."""
-        if near.glossy is None:
-            return
         rays = max(1, round(block.paths / (PATHS_PER_LOBE * len(self._points))))
         for sample, points in enumerate(self._points):
-            glossy = self._glossy[sample]
+            glossy, near = self._glossy[sample], self._nearby(block, _LOBE_HELPERS, sample)
+            if near.glossy is None:
+                return
             for ray in range(rays):
                 for first in range(0, len(glossy.narrow), _AT_ONCE):
                     part = glossy.narrow[first : first + _AT_ONCE]

@@ -28,10 +28,12 @@ def nearby_light(
     reach_bound: float,
     known: Known | None,
     helpers: int = HELPERS,
+    sample: tuple[int, int] = (0, 1),
 ) -> NearbyLight:
     """Puts back what the lights of `block`, bounded by `bound`, leave out within the reach of `reach_bound`.
 
-    Where rays end `helpers` batches of lights shine, others each time, so that in the mean all of them do.
+    Where rays end `helpers` batches of lights shine, others each time, so that in the mean all of them do. Of
+    a pixel's samples each has others too: `sample` is its number, and how many there are.
     """
     world, polygons = blocks.world, blocks.polygons
     surfaces = world.surfaces
@@ -41,7 +43,7 @@ def nearby_light(
     def polish(receivers: Receivers, gloss: Gloss | None, turn: int) -> Float32Array:
         light = np.zeros((3, len(receivers)), dtype=np.float32)
         for k in range(min(helpers, batches)):
-            batch = (turn * helpers + k) % batches
+            batch = ((turn * sample[1] + sample[0]) * helpers + k) % batches
             blocks.shine(light, receivers, helper, batch, bound, max(1.0, batches / helpers), gloss)
         return light
 
