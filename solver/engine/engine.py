@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
-from solver.engine.change_log import ChangeLog, Progress
+from solver.engine.change_log import SETTLED, ChangeLog, Progress
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
@@ -53,6 +53,7 @@ from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
 from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
+from solver.transport.solve import RadiositySolver
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
 
 
@@ -336,7 +337,7 @@ class Engine:
     def _take(self, step: Step) -> tuple[Change, ...]:
         """Go on in the scene that `step` leads to."""
         world = World.of(step.scene, self._world)
-        before = self._progress()
+        before = self._progress() if self._log.is_open else SETTLED
         self._revision += 1
         moved = _moved_alone(step)
         self._settle(world, self._solution, drags=moved is not None and moved == self._moved)
@@ -346,16 +347,12 @@ class Engine:
         return self._log.entries(self._progress())[-len(changes) :]
 
     def _progress(self) -> Progress:
-        solution, solver = self._solution, self._solution.solver
-        statistics = solver.statistics()
-        owed = solver.owed() if isinstance(solver, Redistribution) else {}
+        solver = self._solution.solver
         return Progress(
-            owed=owed,
-            unshot=solver.unshot_fraction * sum(solution.power_by_object().values()),
-            shots=solver.shots
-            if isinstance(solver, Redistribution)
-            else statistics.gathers * statistics.links,
-            is_settled=solution.state is SessionState.CONVERGED,
+            owed=solver.owed() if isinstance(solver, Redistribution) else {},
+            unshot=solver.unshot_power() if isinstance(solver, RadiositySolver) else 0.0,
+            shots=solver.shots,
+            is_settled=self._solution.state is SessionState.CONVERGED,
         )
 
     def _changes(self, step: Step) -> tuple[Change, ...]:

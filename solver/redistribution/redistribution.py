@@ -106,7 +106,7 @@ class Redistribution(RadiositySolver):
         self.linked = surfaces.patch_count
         self.lean: int = earlier.lean if isinstance(earlier, Redistribution) else len(earlier.state.links)
         """Links when all of them were last looked at for mergers"""
-        self._known_error = earlier.error_estimate
+        self._known_error, self.norm = earlier.error_estimate, earlier.norm
         self.error_estimate = 1.0
         self.recent = self._fresh_since(match, earlier)
         """(p,) patches that some link in debt has never met"""
@@ -122,8 +122,9 @@ class Redistribution(RadiositySolver):
         self._plan: _Plan | None = None
         self._paid = 0
         self._new = np.empty(0, dtype=np.int32)
-        self.shots = 0
+        self.looks = 0
         """Links and pairs looked at anew"""
+        self._gathers_before = state.gathers
 
     @property
     def unlinked(self) -> UnlinkedPairs:
@@ -139,6 +140,11 @@ class Redistribution(RadiositySolver):
         """The state, with what has arrived so far."""
         self._take_in()
         return super().hand_over()
+
+    @property
+    def shots(self) -> int:
+        """Links shot over: those looked at anew, and those of all gathers."""
+        return self.looks + super().shots
 
     def field(self) -> RadiosityField:
         """As the solve's, with what has arrived so far."""
@@ -171,7 +177,7 @@ class Redistribution(RadiositySolver):
             self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], plan.light, moments)
             self._unlinked = self._unlinked.without(paired)
             self._paid = part.stop
-            self.shots += part.stop - part.start
+            self.looks += part.stop - part.start
             self.version += 1
             self._guessed_now = self.unshot_fraction = share = plan.share_left(part.stop)
             self.progress = _PROGRESS * (1.0 - share)
@@ -179,7 +185,8 @@ class Redistribution(RadiositySolver):
             since += part.stop - part.start
             if self._is_propagations_turn(share, since):
                 since = 0
-                if self._unshot() > float(plan.left[part.stop]):
+                self._take_in()
+                if self.unshot_power() > float(plan.left[part.stop]):
                     moments = yield from self._propagate()
         self._take_in()
         self._arrived = None
@@ -197,16 +204,6 @@ class Redistribution(RadiositySolver):
         if self.settings.interleaving is Interleaving.REDISTRIBUTE_FIRST and share > _THRESHOLD:
             return False
         return since >= _SHOTS_A_GATHER * len(self._state.links)
-
-    def _unshot(self) -> float:
-        """W of luminance that has arrived and is not propagated."""
-        self._take_in()
-        state = self._state
-        leaves = state.tree.leaves
-        patch = state.tree.patch[leaves]
-        unshot = state.emission[patch] + state.reflectance[patch] * state.received[leaves, 0]
-        unshot -= state.radiosity[leaves, 0]
-        return float(state.tree.area[leaves] @ np.abs(unshot @ state.weights))
 
     def _propagate(self) -> Generator[bool, None, FloatArray]:
         """Shoot all that has arrived. Returns the moments of what elements send from now on."""
@@ -283,9 +280,8 @@ class Redistribution(RadiositySolver):
         order = np.lexsort((-energy, ~lit))
         paired = order[order >= len(rows)] - len(rows)
         self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
-        _, scale = unshot_square(state)
         self._plan = _Plan(
-            doubt=doubt_of(p, q, energy, tree.area) / math.sqrt(max(scale, 1e-300)),
+            doubt=doubt_of(p, q, energy, tree.area) / math.sqrt(max(self.norm, 1e-300)),
             rows=np.concatenate([rows, np.full(len(pairs), -1, dtype=np.int32)])[order],
             debt=np.concatenate([links.debt[rows], pairs.debt])[order],
             energy=energy[order],

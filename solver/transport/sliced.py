@@ -37,6 +37,11 @@ class SlicedSolve:
         return self.outcome is SolveOutcome.RUNNING
 
     @property
+    def shots(self) -> int:
+        """Links shot over, those of all gathers included."""
+        return 0
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know about this solution."""
         told = self.surfaces.warnings

@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.geometry.surfaces import Surfaces
 from solver.transport.closure import balance, is_closed
+from solver.transport.elements import ElementTree
 from solver.transport.estimate import estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light, Linker
@@ -26,7 +27,7 @@ from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.sliced import SlicedSolve
 from solver.transport.state import TransportState
-from solver.types import IntArray, Spectra
+from solver.types import Corners, FloatArray, IntArray, Spectra
 from solver.visibility.bvh import Hierarchy
 from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
@@ -72,6 +73,19 @@ class SolverStatistics:
     seconds: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Leaves:
+    """What `field` tells of the leaves of a tree that had `count` elements."""
+
+    tree: ElementTree
+    count: int
+    leaves: IntArray
+    corners: Corners
+    corner_count: IntArray
+    patch: IntArray
+    area: FloatArray
+
+
 class RadiositySolver(SlicedSolve):
     """One radiosity solution in the making."""
 
@@ -91,6 +105,10 @@ class RadiositySolver(SlicedSolve):
         self._ray_count = 0
         self._rounds = 0
         self._handed: TransportState | None = None
+        self._gathers_before = 0
+        self.norm = 0.0
+        """Squared luminance of what is reflected, times area, by the last estimate"""
+        self._shape: _Leaves | None = None
         self.linked = 0
         """Patches that are linked with all that come after them"""
         self.bound = 0.0
@@ -120,6 +138,7 @@ class RadiositySolver(SlicedSolve):
         other._state = replace(state, surfaces=surfaces)
         other._closed, other.bound, other.linked = self._closed, self.bound, surfaces.patch_count
         other.error_estimate, other.unshot_fraction = self.error_estimate, self.unshot_fraction
+        other.norm = self.norm
         other.progress, other.outcome = 1.0, SolveOutcome.CONVERGED
         return other
 
@@ -146,20 +165,47 @@ class RadiositySolver(SlicedSolve):
         )
 
     def field(self) -> RadiosityField:
-        """The leaves and their radiosities; the ambient term where no light is known yet."""
+        """The leaves and their radiosities; the ambient term where no light is known yet.
+
+        While the leaves are the same, so are the arrays that tell of them, which nobody may change.
+        """
         state = self._state
-        tree = state.tree
-        leaves = tree.leaves
-        patch = tree.patch[leaves]
-        received = np.maximum(state.received[leaves, 0], 0.0)
+        tree, shape = state.tree, self._shape
+        if shape is None or shape.tree is not tree or shape.count != len(tree):
+            leaves = tree.leaves
+            self._shape = shape = _Leaves(
+                tree,
+                len(tree),
+                leaves,
+                tree.corners[leaves],
+                tree.corner_count[leaves],
+                tree.patch[leaves],
+                tree.area[leaves],
+            )
+        received = np.maximum(state.received[shape.leaves, 0], 0.0)
+        patch = shape.patch
         return RadiosityField(
-            corners=tree.corners[leaves],
-            corner_count=tree.corner_count[leaves],
+            corners=shape.corners,
+            corner_count=shape.corner_count,
             patch=patch,
-            area=tree.area[leaves],
+            area=shape.area,
             radiosity=self._to_rgb(state.emission[patch] + state.reflectance[patch] * received),
             irradiance=self._to_rgb(received),
         )
+
+    @property
+    def shots(self) -> int:
+        """Links shot over, those of all gathers included."""
+        return (self._state.gathers - self._gathers_before) * len(self._state.links)
+
+    def unshot_power(self) -> float:
+        """W of luminance that leaves have received and not sent on."""
+        state = self._state
+        leaves = state.tree.leaves
+        patch = state.tree.patch[leaves]
+        unshot = state.emission[patch] + state.reflectance[patch] * state.received[leaves, 0]
+        unshot -= state.radiosity[leaves, 0]
+        return float(state.tree.area[leaves] @ np.abs(unshot @ state.weights))
 
     def _to_rgb(self, spectra: Spectra) -> Spectra:
         return np.repeat(spectra, 3, axis=1) if self._state.channels == 1 else spectra.copy()
@@ -189,6 +235,7 @@ class RadiositySolver(SlicedSolve):
                 yield from self._settle(target, strict=True)
             estimate = estimate_error(state)
             self.error_estimate = max(estimate.relative, cutoff or 0.0)
+            self.norm = estimate.norm
             self._rounds += 1
             self.version += 1
             self._report_progress()

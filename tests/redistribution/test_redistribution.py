@@ -137,7 +137,7 @@ def test_the_energy_owed_falls_and_the_greatest_goes_first() -> None:
     steps = -np.diff(left)
     assert np.all(steps >= -1e-12)
     assert left[-1] == 0.0
-    assert after.shots > 0
+    assert after.looks > 0
 
 
 def test_places_that_a_drag_has_passed_leave_no_debt() -> None:
