@@ -34,10 +34,6 @@ class Progress:
     is_settled: bool
 
 
-SETTLED: Final = Progress({}, 0.0, 0, True)
-"""Of a solution of which no entry waits for anything."""
-
-
 class ChangeLog:
     """All entries of a session, oldest first."""
 
@@ -52,11 +48,6 @@ class ChangeLog:
     def count(self) -> int:
         """Entries that there ever were, before consecutive moves were folded."""
         return self._count
-
-    @property
-    def is_open(self) -> bool:
-        """Whether any entry was not settled when it was last looked at."""
-        return any(entry.state is not ChangeState.SETTLED for entry in self._entries)
 
     def add(self, changes: Sequence[Change], progress: Progress) -> None:
         """Take in what an edit has changed, and remember how far those before it had got."""

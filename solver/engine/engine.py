@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
-from solver.engine.change_log import SETTLED, ChangeLog, Progress
+from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
@@ -337,7 +337,7 @@ class Engine:
     def _take(self, step: Step) -> tuple[Change, ...]:
         """Go on in the scene that `step` leads to."""
         world = World.of(step.scene, self._world)
-        before = self._progress() if self._log.is_open else SETTLED
+        before = self._progress()
         self._revision += 1
         moved = _moved_alone(step)
         self._settle(world, self._solution, drags=moved is not None and moved == self._moved)
@@ -347,12 +347,15 @@ class Engine:
         return self._log.entries(self._progress())[-len(changes) :]
 
     def _progress(self) -> Progress:
-        solver = self._solution.solver
+        solver, shots = self._solution.solver, self._solution.solver.shots
+        if self._solution.state is SessionState.CONVERGED:
+            return Progress({}, 0.0, shots, is_settled=True)
+        owed = solver.owed() if isinstance(solver, Redistribution) else {}
         return Progress(
-            owed=solver.owed() if isinstance(solver, Redistribution) else {},
-            unshot=solver.unshot_power() if isinstance(solver, RadiositySolver) else 0.0,
-            shots=solver.shots,
-            is_settled=self._solution.state is SessionState.CONVERGED,
+            owed=owed,
+            unshot=solver.unshot_power() if isinstance(solver, RadiositySolver) and not owed else 0.0,
+            shots=shots,
+            is_settled=False,
         )
 
     def _changes(self, step: Step) -> tuple[Change, ...]:

@@ -21,18 +21,15 @@ from solver.types import FloatArray, IntArray
 def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) -> TransportState:
     """What `state` is in the scene of `surfaces`; its link table is handed over, not copied.
 
-    Links that may be blocked by patches that are gone are in debt, or come into it by that to `edit`; those
-    of such patches are removed. Irradiance is right but for links that the edit has changed, and for fresh
+    Links that were blocked by patches that are gone are in debt, or come into it by that to `edit`; those of
+    such patches are removed. Irradiance is right but for links that the edit has changed, and for fresh
     patches, whose irradiance is a guess: what they received where they were before, or the ambient term.
     """
     tree, number = ElementTree.carried(surfaces, state.tree, match.number)
     links = state.links
     removed = np.flatnonzero((number[links.p] < 0) | (number[links.q] < 0)).astype(np.int32)
     lost = sent_over(state, removed)
-    if match.only_moves:
-        # Lists may hold patches that are near, but in no shaft; these are still there, if somewhere else.
-        links.forget_of(np.flatnonzero(links.debt).astype(np.int32), match.number)
-    else:
+    if not match.only_moves:
         links.forget(match.number, edit)
     links.remove(removed)
     links.renumber(number, match.number)

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.geometry.surfaces import Surfaces
 from solver.redistribution.matching import Match
-from solver.redistribution.reach import boxes_around, reached_links
-from solver.transport.elements import ElementTree
-from solver.transport.links import LinkTable
+from solver.redistribution.reach import COMING, LEAVING, boxes_around, reached_links
 from solver.transport.state import TransportState
-from solver.types import FloatArray, IntArray
+from solver.types import IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,38 +55,26 @@ class UnlinkedPairs:
         return UnlinkedPairs(self.p[first:], self.q[first:], self.debt[first:])
 
 
-def owe_for_leaving(state: TransportState, match: Match, number: int, margin: float, drags: bool) -> None:
-    """Mark the links of `state` that pass where patches are that are about to go.
+def owe(
+    state: TransportState, surfaces: Surfaces, match: Match, number: int, margin: float, drags: bool
+) -> None:
+    """Mark the links of `state` that pass where patches are about to go or to come, in `surfaces`.
 
-    `drags`: what goes is what was dragged before, and debts for where it is now are void.
+    margin: metres. `drags`: what moves is what was moved before, and debts for where it is now are void.
     """
     links = state.links
-    void = links.debt < 0
-    links.debt[void] = 0 if drags else -links.debt[void]
+    waiting = links.debt < 0
+    links.debt[waiting] = 0 if drags else -links.debt[waiting]
+    gone, fresh = match.gone, match.fresh
+    if len(gone) + len(fresh) == 0:
+        return
+    leaving = boxes_around(state.surfaces.corners[gone], state.surfaces.object[gone])
+    coming = boxes_around(surfaces.corners[fresh], surfaces.object[fresh])
+    reached = reached_links(state.tree, links, leaving, coming, margin)
+    debt = links.debt
+    left = (reached & LEAVING != 0) & (debt == 0)
     if drags:
         # Links in debt to the place that is left have never known it.
-        waiting = np.flatnonzero(void)
-    gone = match.gone
-    if len(gone) == 0:
-        return
-    reached = _reached(state.tree, links, gone, state.surfaces.object, margin)
-    if drags:
-        reached = np.setdiff1d(reached, waiting, assume_unique=True)
-    links.debt[reached] = np.where(links.debt[reached] == 0, number, links.debt[reached])
-
-
-def owe_for_coming(state: TransportState, match: Match, number: int, margin: float) -> None:
-    """Mark the links of `state` that pass where its fresh patches are."""
-    fresh, links = match.fresh, state.links
-    if len(fresh) == 0:
-        return
-    reached = _reached(state.tree, links, fresh, state.surfaces.object, margin)
-    links.debt[reached] = np.where(links.debt[reached] == 0, -number, links.debt[reached])
-
-
-def _reached(
-    tree: ElementTree, links: LinkTable, patches: IntArray, owner: IntArray, margin: float
-) -> IntArray:
-    corners: FloatArray = tree.corners[: tree.patch_count]
-    boxes = boxes_around(corners[patches], owner[patches])
-    return reached_links(tree, links, boxes, margin)
+        left &= ~waiting
+    debt[left] = number
+    debt[(reached & COMING != 0) & (debt == 0)] = -number

@@ -16,33 +16,45 @@ from solver.kernels import inline_kernel, kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
-from solver.types import BoolArray, ByteArray, Corners, FloatArray, IntArray
+from solver.types import ByteArray, Corners, FloatArray, IntArray
 from solver.visibility.bvh import build_hierarchy
 
 _CHUNK: Final = 1 << 15
 
 
-def reached_links(tree: ElementTree, links: LinkTable, boxes: FloatArray, margin: float) -> IntArray:
-    """Links (k,), ascending, whose light may pass through `boxes` (n, 2, 3), grown by `margin` metres."""
+LEAVING: Final = 1
+COMING: Final = 2
+"""What a link's light may pass through: what is about to go, and what is about to come."""
+
+
+def reached_links(
+    tree: ElementTree, links: LinkTable, leaving: FloatArray, coming: FloatArray, margin: float
+) -> ByteArray:
+    """For each link (n,) which boxes its light may pass through, as a sum of LEAVING and COMING.
+
+    Boxes (k, 2, 3) are grown by `margin` metres.
+    """
     count = tree.patch_count
     met = np.zeros((count, count), dtype=np.uint8)
     corners = tree.corners[:count]
     hierarchy = build_hierarchy(corners, np.arange(count, dtype=np.int32))
     low, high = corners.min(axis=1), corners.max(axis=1)
-    for box in boxes:
+    boxes = np.concatenate([leaving, coming])
+    kind = np.repeat(np.array([LEAVING, COMING], dtype=np.uint8), [len(leaving), len(coming)])
+    boxes[:, 0] -= margin
+    boxes[:, 1] += margin
+    for box, bit in zip(boxes, kind, strict=True):
         _reach_patches(
             hierarchy.low, hierarchy.high, hierarchy.skip, hierarchy.first, hierarchy.count, hierarchy.order,
-            low, high, box[0] - margin, box[1] + margin, met,
+            low, high, box[0], box[1], int(bit), met,
         )  # fmt: skip
-    found = np.zeros(len(links), dtype=np.bool_)
+    found = np.zeros(len(links), dtype=np.uint8)
 
     def work(start: int, stop: int) -> None:
-        _reach_links(
-            links.p, links.q, tree.patch, tree.corners, met, boxes, margin, start, stop, found
-        )  # fmt: skip
+        _reach_links(links.p, links.q, tree.patch, tree.corners, met, boxes, kind, start, stop, found)
 
     run_chunks(work, len(links), _CHUNK)
-    return np.flatnonzero(found).astype(np.int32)
+    return found
 
 
 def boxes_around(corners: Corners, owner: IntArray) -> FloatArray:
@@ -105,9 +117,10 @@ def _reach_patches(
     patch_high: FloatArray,
     box_low: FloatArray,
     box_high: FloatArray,
+    bit: int,
     met: ByteArray,
 ) -> None:
-    """Mark the pairs (p, p) of patches whose hull meets a box, either way round."""
+    """Mark the pairs (p, p) of patches whose hull meets a box by `bit`, either way round."""
     if len(skip) == 0:
         return
     stack = np.empty((4096, 2), dtype=np.int32)
@@ -128,8 +141,8 @@ def _reach_patches(
                     if hull_meets(
                         patch_low[p], patch_high[p], patch_low[q], patch_high[q], box_low, box_high
                     ):
-                        met[p, q] = 1
-                        met[q, p] = 1
+                        met[p, q] |= bit
+                        met[q, p] |= bit
             continue
         if a == b:
             first = a + 1
@@ -169,18 +182,17 @@ def _reach_links(
     corners: Corners,
     met: ByteArray,
     boxes: FloatArray,
-    margin: float,
+    kind: ByteArray,
     start: int,
     stop: int,
-    found: BoolArray,
+    found: ByteArray,
 ) -> None:
     bounds = np.empty((4, 3))
-    low = np.empty(3)
-    high = np.empty(3)
     for link in range(start, stop):
         i = p[link]
         j = q[link]
-        if not met[patch[i], patch[j]]:
+        possible = met[patch[i], patch[j]]
+        if possible == 0:
             continue
         for axis in range(3):
             bounds[0, axis] = bounds[1, axis] = corners[i, 0, axis]
@@ -191,9 +203,9 @@ def _reach_links(
                 bounds[2, axis] = min(bounds[2, axis], corners[j, k, axis])
                 bounds[3, axis] = max(bounds[3, axis], corners[j, k, axis])
         for box in range(len(boxes)):
-            for axis in range(3):
-                low[axis] = boxes[box, 0, axis] - margin
-                high[axis] = boxes[box, 1, axis] + margin
-            if hull_meets(bounds[0], bounds[1], bounds[2], bounds[3], low, high):
-                found[link] = True
-                break
+            if (
+                possible & kind[box]
+                and not found[link] & kind[box]
+                and hull_meets(bounds[0], bounds[1], bounds[2], bounds[3], boxes[box, 0], boxes[box, 1])
+            ):
+                found[link] |= kind[box]

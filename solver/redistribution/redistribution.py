@@ -21,7 +21,7 @@ import numpy as np
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.redistribution.carrying import carry, moments_of
-from solver.redistribution.debts import UnlinkedPairs, owe_for_coming, owe_for_leaving
+from solver.redistribution.debts import UnlinkedPairs, owe
 from solver.redistribution.energy import doubt_of, energies_at_stake, unshot_square
 from solver.redistribution.matching import Match, match_patches
 from solver.transport.coarsen import coarsen, unneeded
@@ -97,9 +97,8 @@ class Redistribution(RadiositySolver):
         match = match_patches(earlier.surfaces, surfaces)
         margin = 2.0 * tolerances.SIDE * max(surfaces.size, earlier.surfaces.size)
         state = earlier.hand_over()
-        owe_for_leaving(state, match, number, margin, drags)
+        owe(state, surfaces, match, number, margin, drags)
         self._state = carry(state, surfaces, match, number)
-        owe_for_coming(self._state, match, number, margin)
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
         self.bound = earlier.bound
@@ -299,7 +298,7 @@ class Redistribution(RadiositySolver):
         if len(rows) == 0:
             return rows
         links = self._state.links
-        changed, fresh = self._linker.renew(self._state.tree, links, rows, self._near, light)
+        changed, fresh = self._linker.renew(self._state.tree, links, rows, self.recent, self._near, light)
         exchange = links.open_exchange[changed] * links.visibility[changed]
         self._shoot(
             fresh,

@@ -18,7 +18,7 @@ from solver.transport.elements import ElementTree
 from solver.transport.links import LinkBatch, LinkTable, take_ranges
 from solver.transport.oracle import samples_needed
 from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
-from solver.types import FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
@@ -126,14 +126,20 @@ class Linker:
         return self._evaluate(tree, p, q, kind, kept, pool, np.ones(n, dtype=np.int32), light, keep_dark)
 
     def renew(
-        self, tree: ElementTree, links: LinkTable, rows: IntArray, recent: Hierarchy, light: Light
+        self,
+        tree: ElementTree,
+        links: LinkTable,
+        rows: IntArray,
+        recent: BoolArray,
+        near: Hierarchy,
+        light: Light,
     ) -> tuple[IntArray, LinkBatch]:
         """Links of `rows` (n,) as they are now that patches have come and gone.
 
-        recent: of the patches that came; those that went are -1 among the blockers. Returns the rows (m,)
-        that are different, and what they are now.
+        recent (p,): patches that came, which are in the hierarchy `near`. Those that went are -1 among the
+        blockers, or are there again, elsewhere. Returns the rows (m,) that are different, and what they are.
         """
-        s, h = self.surfaces, recent
+        s, h = self.surfaces, near
         p, q = links.p[rows], links.q[rows]
         before, listed, first = links.kind[rows], links.blocker_count[rows], links.blocker_start[rows]
         n = len(rows)
@@ -146,7 +152,7 @@ class Linker:
             renewed_blockers(
                 p, q, before, tree.corners, tree.corner_count, tree.patch, s.corners, s.corner_count,
                 s.normal, h.low, h.high, h.skip, h.first, h.count, h.order, self.side_tolerance, first,
-                listed, links.pool, start, stop, room, kind, kept, loose,
+                listed, links.pool, recent, start, stop, room, kind, kept, loose,
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)

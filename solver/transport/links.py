@@ -264,13 +264,6 @@ class LinkTable:
 
         run_chunks(work, len(self), 1 << 14)
 
-    def forget_of(self, rows: IntArray, patch: IntArray) -> None:
-        """The same for `rows` (n,) alone, which are in debt."""
-        debt = np.ones(len(rows), dtype=np.int32)
-        _forget(
-            self.pool, self.blocker_start[rows], self.blocker_count[rows], debt, patch, 1, 0, len(rows)
-        )  # fmt: skip
-
     def remove(self, gone: IntArray) -> None:
         """Take out the rows `gone` (n,), ascending. The last ones fill their places."""
         self._fill(gone)

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import ByteArray, Corners, FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, ByteArray, Corners, FloatArray, Int64Array, IntArray
 from solver.visibility.bvh import walk_hierarchy
 from solver.visibility.culling import BLOCK, LANES, MAY_COVER, OUTSIDE, cull_block, gather_blocks
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE, PARTIAL, covers, shaft_planes
@@ -181,6 +181,7 @@ def renewed_blockers(
     list_start: Int64Array,
     list_count: IntArray,
     lists: IntArray,
+    recent: BoolArray,
     start: int,
     stop: int,
     room: Int64Array,
@@ -190,10 +191,10 @@ def renewed_blockers(
 ) -> None:
     """Blockers of pairs [start, stop) of elements, from those known before some patches came or went.
 
-    Patches that went are -1 in the lists; those that came are in the hierarchy. `before` is the visibility
-    class that was. Writes the class, UNCHANGED where nothing is different, or UNKNOWN where what hid the
-    pair entirely is gone, so that the other blockers are not known; and the lists where they are different,
-    to pool[room[pair]:].
+    Patches that went are -1 in the lists; those that came are `recent`, and in the hierarchy. `before` is the
+    visibility class that was. Writes the class, UNCHANGED where nothing is different, or UNKNOWN where what
+    hid the pair entirely is gone, so that the other blockers are not known; and the lists where they are
+    different, to pool[room[pair]:].
     """
     planes = np.empty((MAX_PLANES, 4))
     candidates = np.empty(len(order), dtype=np.int32)
@@ -205,7 +206,7 @@ def renewed_blockers(
         q = pair_q[pair]
         kept = 0
         for k in range(list_start[pair], list_start[pair] + list_count[pair]):
-            if lists[k] >= 0:
+            if lists[k] >= 0 and not recent[lists[k]]:
                 pool[room[pair] + kept] = lists[k]
                 kept += 1
         lost = kept < list_count[pair]
@@ -219,20 +220,10 @@ def renewed_blockers(
         found = walk_hierarchy(
             low, high, skip, leaf_first, leaf_count, order, planes, plane_count, tolerance, candidates
         )
-        fresh = 0
-        for k in range(found):
-            known = False
-            for m in range(room[pair], room[pair] + kept):
-                if pool[m] == candidates[k]:
-                    known = True
-                    break
-            if not known:
-                candidates[fresh] = candidates[k]
-                fresh += 1
-        gather_blocks(corners, normals, candidates, 0, fresh, blocks)
+        gather_blocks(corners, normals, candidates, 0, found, blocks)
         kind, added = _cull(
             corners, counts, normals, patch[p], patch[q], element_corners[p], element_counts[p],
-            element_corners[q], element_counts[q], planes, plane_count, candidates, 0, fresh, blocks,
+            element_corners[q], element_counts[q], planes, plane_count, candidates, 0, found, blocks,
             tolerance, work, verdict, pool, room[pair] + kept,
         )  # fmt: skip
         if kind == NONE:

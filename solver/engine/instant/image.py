@@ -69,6 +69,7 @@ def mean_gloss(images: list[Image], glossy: list[GlossyPoints]) -> list[Float32A
 
 def _mean(parts: list[tuple[Float32Array, BoolArray, int]], count: int) -> Float32Array:
     total, weight = np.zeros((3, count), dtype=np.float32), np.zeros(count, dtype=np.float32)
+    parts = [(np.ascontiguousarray(light), valid, paths) for light, valid, paths in parts]
 
     def add(start: int, stop: int) -> None:
         for light, valid, paths in parts:
