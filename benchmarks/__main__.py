@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 _SECTIONS: Final = (
     "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "walks",
-    "instant", "lights", "walkthrough", "service",
+    "instant", "lights", "walkthrough", "edits", "drags", "service",
 )  # fmt: skip
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 
@@ -39,6 +40,10 @@ def bench(
     file: Annotated[
         Path | None, typer.Option("--json", help="Write all figures here, too.", metavar="FILE")
     ] = None,
+    plots: Annotated[
+        Path | None,
+        typer.Option(help="Draw curves into this directory; needs the packages of `make setup-dev`."),
+    ] = None,
 ) -> None:  # fmt: skip
     """Measure time, memory, rays and frames against error, and say which targets are met.
 
@@ -47,6 +52,8 @@ def bench(
     """
     from benchmarks import (
         accuracy,
+        drags,
+        edits,
         fine,
         frames,
         instant,
@@ -70,12 +77,16 @@ def bench(
     chosen = _named(only, _SECTIONS, "--only") if only else _SECTIONS
     modules = (
         solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, walks,
-        instant, instant_costs, walkthrough, serving,
+        instant, instant_costs, walkthrough, edits, drags, serving,
     )  # fmt: skip
     made = (module.section(options) for module in modules)
     plan = [section for section in made if section.name in chosen and section.jobs]
     if file is not None and not file.parent.is_dir():
         raise typer.BadParameter(f"there is no directory {file.parent}", param_hint="--json")
+    if plots is not None and find_spec("matplotlib") is None:
+        raise typer.BadParameter(
+            "curves are drawn by matplotlib, which is not installed", param_hint="--plots"
+        )
     machine, start = Machine.this(), time.perf_counter()
     found: dict[str, list[Any]] = {}
     targets: list[Target] = []
@@ -92,6 +103,9 @@ def bench(
             table = section.table(measured)
             targets.extend(table.targets)
             _tell(table.markdown() if markdown else table.rich())
+            if plots is not None and section.plot is not None:
+                plots.mkdir(parents=True, exist_ok=True)
+                section.plot(measured, plots)
         bar.update(task, note="")
     if file is not None:
         record = {"machine": machine.record(), "options": asdict(options)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.tables import Table
@@ -36,3 +37,5 @@ class Section:
     name: str
     jobs: tuple[Job, ...]
     table: Callable[[list[Any]], Table]
+    plot: Callable[[list[Any], Path], None] | None = None
+    """Draws what they return into files of a directory"""
