@@ -49,6 +49,7 @@ from solver.engine.views import (
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
+from solver.illumination.interpolation.interpolants import Interpolants
 from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
 from solver.redistribution.memory import Memory
@@ -85,6 +86,8 @@ class Engine:
         self._log = ChangeLog()
         self._turn = 0
         self._memory = Memory()
+        self._seen: Interpolants | None = None
+        """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
         self._settle(World.of(scene), None, False)
 
@@ -261,7 +264,11 @@ class Engine:
 
     def _settle(self, world: World, earlier: Solution | None, drags: bool) -> None:
         """Let light settle in `world`, anew or from what it was `earlier`."""
-        solution = Solution(world, self._settings, earlier, self._revision, drags, self._memory)
+        seen = None if self._fine is None else self._fine.interpolants
+        solution = Solution(
+            world, self._settings, earlier, self._revision, drags, self._memory, anew=seen is not None
+        )
+        self._seen = None if solution.trace() is None else seen or self._seen
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
         if self._instant is not None:
@@ -298,7 +305,7 @@ class Engine:
         """Fine light, once the solution rests; a sampled one never has any."""
         rests = self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED)
         if self._fine is None and rests and not self._solution.is_sampled:
-            self._fine = FineLight(self._solution, self._drawing, self._settings)
+            self._fine = FineLight(self._solution, self._drawing, self._settings, self._seen)
         return self._fine
 
     def _instant_view(self, camera: Camera, request: FrameRequest) -> InstantView:

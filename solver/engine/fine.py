@@ -49,8 +49,17 @@ _FIRST: Final = 1e9
 class FineLight:
     """The interpolants of one solution in the making."""
 
-    def __init__(self, solution: Solution, drawing: Drawing, settings: LightSettings) -> None:
-        """Nothing is built yet. Raises ValueError for a sampled solution."""
+    def __init__(
+        self,
+        solution: Solution,
+        drawing: Drawing,
+        settings: LightSettings,
+        before: Interpolants | None = None,
+    ) -> None:
+        """Nothing is built yet; what edits left as it was is taken over from the interpolants `before`.
+
+        Raises ValueError for a sampled solution.
+        """
         self.version = 0
         """Counts the changes of what can be drawn."""
         self.failure: str | None = None
@@ -63,6 +72,8 @@ class FineLight:
         self._settings = settings
         self._cameras: OrderedDict[tuple[float, ...], Camera] = OrderedDict()
         self._seen: dict[tuple[float, ...], FloatArray] = {}
+        self._before = before
+        self._taken_over = 0
         self._interpolants: Interpolants | None = None
         self._lines: Lines | None = None
         self._point: PointIrradiance | None = None
@@ -99,6 +110,7 @@ class FineLight:
             discontinuities_crowded=0 if told is None else told.dropped_by_limit,
             triangles=0 if interpolants is None else len(interpolants.triangulation.triangles),
             interpolants=0 if interpolants is None else int(interpolants.is_fine.sum()),
+            taken_over=self._taken_over,
             point_irradiances=self._evaluations + (0 if interpolants is None else interpolants.evaluations),
         )
 
@@ -182,7 +194,8 @@ class FineLight:
         field = self._solution.field()
         cells = Cells.of(field)
         self._lines = yield from find_lines(state, hierarchy, field, self._settings)
-        triangulation: Triangulation | None = None
+        before, trace = self._before, self._solution.trace()
+        triangulation: Triangulation | None = None if before is None else before.triangulation
         while True:
             edges = self._lines.edges
             triangulation = yield from triangulate_in_steps(cells, surfaces, edges, triangulation)
@@ -192,6 +205,10 @@ class FineLight:
             )
             if self._interpolants is not None:
                 self._evaluations += self._interpolants.evaluations
+            elif before is not None and trace is not None:
+                doubt = trace.at_leaves(state.tree)
+                self._taken_over = interpolants.follow(before, trace.patch, doubt)
+                self._before = None
             self._interpolants = interpolants
             self._look(interpolants)
             yield

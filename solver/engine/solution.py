@@ -16,6 +16,7 @@ from solver.errors import SolverError
 from solver.geometry.surfaces import Surfaces
 from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
+from solver.redistribution.trace import Trace
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -38,11 +39,13 @@ class Solution:
         number: int = 1,
         drags: bool = False,
         memory: Memory | None = None,
+        anew: bool = True,
     ) -> None:
         """Go on from `earlier`, the solution of an earlier revision, which is used up, unless it failed.
 
         `number` of the edit in between, which moves on what the one before moved, and nothing else, if it
-        `drags`. A solution that `memory` has is taken from there; it is shown this one when it has settled.
+        `drags`; what it does to the light is traced `anew`. A solution that `memory` has is taken from there;
+        it is shown this one when it has settled.
         """
         self.world = world
         self.solver: RadiositySolver | SampledSolver
@@ -60,11 +63,15 @@ class Solution:
         elif before is None:
             self.solver = RadiositySolver(surfaces, rays, settings)
         else:
-            self.solver = Redistribution(surfaces, rays, settings, before, number, drags)
+            self.solver = Redistribution(surfaces, rays, settings, before, number, drags, anew)
         self._beyond_diffuse = _beyond_diffuse(world.surfaces, self.is_sampled)
         self._failure: SolverError | MemoryError | None = None
         self._field: RadiosityField | None = None
         self._field_version = -1
+
+    def trace(self) -> Trace | None:
+        """What edits have done to the light since it was last traced anew; None where that is not known."""
+        return self.solver.trace if isinstance(self.solver, Redistribution) else None
 
     def lend(self) -> None:
         """Let somebody read the solver's state for longer than the next edit may come."""

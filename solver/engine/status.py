@@ -47,6 +47,8 @@ class FineStatistics:
     triangles: int = 0
     interpolants: int = 0
     """Triangles whose samples are point irradiances"""
+    taken_over: int = 0
+    """Samples that edits left as they were, but for what the solution tells"""
     point_irradiances: int = 0
     """Computed so far"""
 

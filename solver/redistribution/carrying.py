@@ -6,7 +6,7 @@ takes the light with it that it had sent: its links shoot their energy once more
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,18 @@ from solver.transport.state import TransportState
 from solver.types import FloatArray, IntArray
 
 
-def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) -> TransportState:
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A solution in the next revision."""
+
+    state: TransportState
+    source: IntArray
+    """(n,) the element that each one was before, -1 for none"""
+    dimmed: FloatArray
+    """(n,) luminance irradiance, W/m2, that links of the element have lost with patches that are gone"""
+
+
+def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) -> Carried:
     """What `state` is in the scene of `surfaces`; its link table is handed over, not copied.
 
     Links that were blocked by patches that are gone are in debt, or come into it by that to `edit`; those of
@@ -54,9 +65,11 @@ def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) ->
     after.closure[fresh] = 1.0
     for functions in (after.radiosity, after.received, after.remainder):
         functions[fresh] = 0.0
+    dimmed = np.zeros(len(tree))
     if len(removed):
         lost = _in_channels(state, lost[source], channels)
         lost[fresh] = 0.0
+        dimmed = np.abs(lost[:, 0] @ after.weights)
         after.add_received(lost, -1.0)
     _repaint(state, after, match)
     known = match.likeness[fresh] >= 0
@@ -65,7 +78,8 @@ def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) ->
         before = _in_channels(state, means(state.tree, state.received), channels)
         after.received[fresh[known], 0] = before[match.likeness[fresh[known]]]
     after.radiosity[fresh, 0] = after.emission[fresh] + after.reflectance[fresh] * after.received[fresh, 0]
-    return after
+    source[fresh] = -1
+    return Carried(after, source, dimmed)
 
 
 def sent_over(state: TransportState, rows: IntArray) -> FloatArray:

@@ -24,6 +24,7 @@ from solver.redistribution.carrying import carry, moments_of
 from solver.redistribution.debts import UnlinkedPairs, owe
 from solver.redistribution.energy import doubt_of, energies_at_stake, unshot_square
 from solver.redistribution.matching import Match, match_patches
+from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, unneeded
 from solver.transport.estimate import Residuals
 from solver.transport.field import RadiosityField
@@ -87,18 +88,20 @@ class Redistribution(RadiositySolver):
         earlier: RadiositySolver,
         number: int = 1,
         drags: bool = False,
+        anew: bool = True,
     ) -> None:
         """Take over what `earlier` has and owes; no light is moved yet but what has gone with its surfaces.
 
         `number`: of the edit, greater than those before. `drags`: it moves the object that the edit before
-        moved, and no other.
+        moved, and no other. `anew`: the trace of what happens begins with this edit.
         """
         super().__init__(surfaces, rays, settings)
         match = match_patches(earlier.surfaces, surfaces)
         margin = 2.0 * tolerances.SIDE * max(surfaces.size, earlier.surfaces.size)
         state = earlier.hand_over()
         owe(state, surfaces, match, number, margin, drags)
-        self._state = carry(state, surfaces, match, number)
+        carried = carry(state, surfaces, match, number)
+        self._state = carried.state
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
         self.bound = earlier.bound
@@ -113,6 +116,9 @@ class Redistribution(RadiositySolver):
             surfaces.corners, np.flatnonzero(self.recent & (surfaces.side == 0)).astype(np.int32)
         )
         self._fresh = match.fresh
+        before = earlier.trace if isinstance(earlier, Redistribution) and not anew else None
+        self.trace: Trace = Trace.after(before, match, carried)
+        """What has happened since the last solution that somebody looked at closely"""
         self._guess = self._state.received[self._fresh, 0].copy()
         self._guessed = 1.0
         """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
@@ -255,6 +261,7 @@ class Redistribution(RadiositySolver):
             residuals = residuals.grown(state, rows)
         gone = unneeded(state.tree, state.links)
         if gone.sum() > _FOLDED * len(gone):
+            self.trace.keep(np.flatnonzero(~gone).astype(np.int32))
             state.fold(gone)
             self.version += 1
             yield True
@@ -328,6 +335,10 @@ class Redistribution(RadiositySolver):
         moments: FloatArray,
     ) -> None:
         assert self._arrived is not None
+        area, weights = self._state.tree.area, self._state.weights
+        to_p = exchange / area[batch.p] * (moments[batch.q, 0] @ weights)
+        to_q = exchange / area[batch.q] * (moments[batch.p, 0] @ weights)
+        self.trace.disturb(batch.p, batch.q, to_p, to_q)
         self._ray_count += STRATA * int(batch.samples.sum())
         gather(
             batch.p, batch.q, exchange, slope_p, slope_q, self._state.tree.area, moments, 0, len(batch.p),

@@ -20,10 +20,17 @@ from solver.illumination.meshing.cells import Cells
 from solver.illumination.meshing.triangulation import Triangulation
 from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.pace import Pace
-from solver.types import BoolArray, FloatArray, IntArray, Points, Spectra
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points, Spectra
 
 _MIDDLE: Final = 0.7
 """RMS error of a quadratic over a triangle, relative to that at its middle: of a cubic, half a kink."""
+
+STRAYED: Final = 0.1
+"""Change of a sample, relative to itself, that the solution's linear functions may tell in place of a point
+irradiance; they are wrong about some hundredths of it."""
+
+_SHADOW: Final = 5.0
+"""What moves with a shadow counts so many times: linear functions do not tell where it ends."""
 
 _BATCH: Final = 4096
 """Samples, at most, whose turn is decided at once."""
@@ -59,6 +66,8 @@ class Interpolants:
         self._middle: Points = vertices.mean(axis=1)
         self._values = self._coarse(vertices)
         self._exact = np.zeros(len(self._samples.position), dtype=np.bool_)
+        self._strayed = np.zeros(len(self._samples.position))
+        """How far exact samples may have strayed from point irradiance since they were, relative"""
         self._checked = np.zeros(t, dtype=np.bool_)
         self._check = np.zeros((t, self._values.shape[1]))
         self._wanted = np.zeros(t)
@@ -215,8 +224,65 @@ class Interpolants:
         )
         found[found] = before._exact[at[found]]
         self._values[found] = before._values[at[found]]
+        self._strayed[found] = before._strayed[at[found]]
         self._exact[found] = True
         found, at = find_places(before._middle, theirs, self._middle, mine)
         found[found] = before._checked[at[found]]
         self._check[found] = before._check[at[found]]
         self._checked[found] = self._exact[self._samples.node[found]].all(axis=1)
+
+    def follow(self, before: Interpolants, number: IntArray, doubt: FloatArray) -> int:
+        """Go on from the interpolants of an earlier revision; returns how many samples stand for exact ones.
+
+        number (p,): what each patch was then, -1 where it was not. doubt (leaves,): luminance irradiance,
+        W/m2, that has come or gone because something is seen or hidden. Samples change by what the solution's
+        own linear functions have changed by, which is right while that is little, and no shadow has moved.
+        """
+        patch = number[self.triangulation.patch]
+        theirs = before.triangulation.patch[before._samples.triangle]
+        where = self._samples.position
+        found, at = find_places(before._samples.position, theirs, where, patch[self._samples.triangle])
+        found[found] = before._exact[at[found]]
+        mine, old = np.flatnonzero(found), at[found]
+        leaf = self.triangulation.leaf
+        values, strayed = self._moved(
+            before, before._values[old], before._samples.position[old], before._samples.triangle[old],
+            where[mine], self._samples.triangle[mine], doubt,
+        )  # fmt: skip
+        strayed += before._strayed[old]
+        self._values[mine] = values
+        good = strayed <= STRAYED
+        self._strayed[mine[good]] = strayed[good]
+        self._exact[mine[good]] = True
+        found, at = find_places(before._middle, before.triangulation.patch, self._middle, patch)
+        found[found] = before._checked[at[found]] & self._exact[self._samples.node[found]].all(axis=1)
+        mine, old = np.flatnonzero(found), at[found]
+        self._check[mine], _ = self._moved(
+            before, before._check[old], before._middle[old], old, self._middle[mine], mine, doubt
+        )
+        self._checked[mine] = True
+        self._measure(np.arange(len(leaf), dtype=np.int32))
+        return int(good.sum())
+
+    def _moved(
+        self,
+        before: Interpolants,
+        values: Spectra,
+        then: Points,
+        then_triangle: Int64Array | IntArray,
+        now: Points,
+        now_triangle: Int64Array | IntArray,
+        doubt: FloatArray,
+    ) -> tuple[Spectra, FloatArray]:
+        """Irradiances (k, channels) of places (k, 3), from earlier ones, and how doubtful (k,) they are."""
+        leaf, leaf_then = self.triangulation.leaf[now_triangle], before.triangulation.leaf[then_triangle]
+        told = self._point.solved(now, self._elements[leaf])
+        change = told - _in_channels(before._point.solved(then, before._elements[leaf_then]), told.shape[1])
+        values = np.maximum(_in_channels(values, told.shape[1]) + change, 0.0)
+        change_seen = np.abs(change) @ self._point.weights
+        scale = np.maximum(values @ self._point.weights, 1e-300)
+        return values, (change_seen + _SHADOW * doubt[leaf]) / scale
+
+
+def _in_channels(values: Spectra, channels: int) -> Spectra:
+    return values if values.shape[1] == channels else np.repeat(values[:, :1], channels, axis=1)
