@@ -43,6 +43,8 @@ class Sample:
 
     work: Work
     error: EditError
+    to_come: EditError
+    """The same against where the method ends: what more work on the same will take away"""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,11 @@ class Track:
 
     def curve(self, witness: EditWitness, most: BoolArray) -> Curve:
         """The errors, where `most` (m,) tells the elements that change most."""
-        told = (Sample(work, witness.error(luminance, most)) for work, luminance in self.looks)
+        _, end = self.looks[-1]
+        told = (
+            Sample(work, witness.error(luminance, most), witness.error(luminance, most, end))
+            for work, luminance in self.looks
+        )
         return Curve(self.method, tuple(told))
 
 

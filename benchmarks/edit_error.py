@@ -58,11 +58,15 @@ class EditWitness:
         most[np.argpartition(change, -count)[-count:]] = True
         return most
 
-    def error(self, luminance: FloatArray, most: BoolArray) -> EditError:
-        """The error of reflected luminances (m,) of the elements, W/m2, of which some change `most` (m,)."""
+    def error(self, luminance: FloatArray, most: BoolArray, truth: FloatArray | None = None) -> EditError:
+        """The error of reflected luminances (m,) of the elements, W/m2, of which some change `most` (m,).
+
+        It is told against `truth` (m,), None for the reference.
+        """
+        truth = self._reference if truth is None else truth
         area = self._tree.area[self.leaves]
-        square = area * (luminance - self._reference) ** 2
-        norm = area * self._reference**2
+        square = area * (luminance - truth) ** 2
+        norm = area * truth**2
         return EditError(
             float(np.sqrt(square.sum() / norm.sum())), float(np.sqrt(square[most].sum() / norm[most].sum()))
         )

@@ -58,6 +58,7 @@ def test_errors_are_told_of_what_is_reflected() -> None:
     assert witness.error(luminance, most) == EditError(0.0, 0.0)
     off = witness.error(1.1 * luminance, most)
     assert (off.everywhere, off.where_most) == pytest.approx((0.1, 0.1))
+    assert witness.error(0.5 * luminance, most, 0.5 * luminance) == EditError(0.0, 0.0)
     assert witness.error(0.0 * luminance, most) == EditError(1.0, 1.0)
 
 
@@ -90,7 +91,8 @@ def test_an_object_that_moves_is_told_against_itself() -> None:
 def test_curves_tell_when_an_error_is_reached_for_good() -> None:
     errors = (0.9, 0.1, 0.3, 0.15, 0.02)
     samples = (
-        Sample(Work(float(k), float(k), 0, k, k, k), EditError(0.5 * e, e)) for k, e in enumerate(errors)
+        Sample(Work(float(k), float(k), 0, k, k, k), EditError(0.5 * e, e), EditError(e, e))
+        for k, e in enumerate(errors)
     )
     curve = Curve("any", tuple(samples))
     assert curve.until(0.2) == 3.0
@@ -126,6 +128,7 @@ def test_edits_are_measured(tmp_path: Path) -> None:
         assert one.changed == max(1, round(0.01 * one.elements))
         for curve in one.curves:
             first, last = curve.samples[0], curve.samples[-1]
+            assert last.to_come == EditError(0.0, 0.0)
             assert last.error.where_most < first.error.where_most
             assert 0.0 < first.work.cpu < last.work.cpu
         shot = one.curves[-1].samples
