@@ -126,7 +126,8 @@ class Redistribution(RadiositySolver):
         self._arrived: FloatArray | None = None
         self._plan: _Plan | None = None
         self._paid = 0
-        self._new = np.empty(0, dtype=np.int32)
+        self._new = self._faded = np.empty(0, dtype=np.int32)
+        """Links that are new or have changed, and those of them that something has ceased to block"""
         self.looks = 0
         """Links and pairs looked at anew"""
         self._gathers_before = state.gathers
@@ -172,12 +173,15 @@ class Redistribution(RadiositySolver):
         self._arrived = np.zeros_like(state.received)
         # What has been shot is as uncertain as what has not, until it is propagated.
         self.error_estimate = min(1.0, math.hypot(self._known_error, plan.doubt))
-        changed: list[IntArray] = []
+        changed, faded = [], []
         since = 0
         old = len(state.links)
         yield True
         for part in self._pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
-            changed.append(self._look_again(plan.rows[part], plan.light, moments))
+            seen = plan.rows[part][plan.rows[part] >= 0]
+            left = seen[state.links.debt[seen] > 0]
+            changed.append(self._look_again(seen, plan.light, moments))
+            faded.append(np.intersect1d(changed[-1], left, assume_unique=True))
             paired = int((plan.rows[part] < 0).sum())
             self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], plan.light, moments)
             self._unlinked = self._unlinked.without(paired)
@@ -198,6 +202,7 @@ class Redistribution(RadiositySolver):
         unshot, scale = unshot_square(state)
         new = math.sqrt(unshot / scale) if scale > 0.0 else 1.0
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
+        self._faded = np.concatenate([self._faded, *faded])
         self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
         yield from self._refine_as_before()
 
@@ -239,13 +244,15 @@ class Redistribution(RadiositySolver):
         residuals = Residuals.of(state)
         yield True
         full = len(state.links) > _CREEP * self.lean
-        tried = np.arange(len(state.links), dtype=np.int32) if full else self._new
-        work = coarsen(state, self._linker, self._pace, tried, residuals, self.bound)
+        rows, merging = self._new, self._faded
+        if full:
+            rows = merging = np.arange(len(state.links), dtype=np.int32)
+        work = coarsen(state, self._linker, self._pace, rows, merging, residuals, self.bound)
         while True:
             try:
                 next(work)
             except StopIteration as end:
-                rows: IntArray = end.value
+                rows = end.value
                 break
             yield True
         if full:
@@ -297,11 +304,7 @@ class Redistribution(RadiositySolver):
         return self._plan
 
     def _look_again(self, rows: IntArray, light: Light, moments: FloatArray) -> IntArray:
-        """Let links shoot what their form factors have changed by; rows below 0 are none.
-
-        Returns the rows (m,) that have changed.
-        """
-        rows = rows[rows >= 0]
+        """Let links shoot what they have changed by. Returns the rows (m,) that have changed."""
         if len(rows) == 0:
             return rows
         links = self._state.links

@@ -30,21 +30,30 @@ much."""
 
 
 def coarsen(
-    state: TransportState, linker: Linker, pace: Pace, rows: IntArray, residuals: Residuals, bound: float
+    state: TransportState,
+    linker: Linker,
+    pace: Pace,
+    rows: IntArray,
+    merging: IntArray,
+    residuals: Residuals,
+    bound: float,
 ) -> Generator[None, None, IntArray]:
-    """Merge links among `rows` (n,) where a link errs by less than `bound` afterwards, squared, times area.
+    """Merge links among `merging` (k,) where a link errs by less than `bound` after it, squared, times area.
 
-    Yields every few milliseconds. Returns the rows (m,), ascending, of what has become of the given ones.
+    Yields every few milliseconds. Returns the rows (m,), ascending, of what has become of `rows` (n,), which
+    are those and others.
     """
     tree, links = state.tree, state.links
-    tried = np.zeros(len(links), dtype=np.bool_)
+    tried = np.ones(len(links), dtype=np.bool_)
+    tried[merging] = False
     while True:
-        errors = residuals.estimate(state, links.take(rows)).links.sum(axis=0)
-        group, ends = _families(tree, links, rows, errors, _SMOOTHER * bound, tried)
+        candidates = rows[~tried[rows]]
+        errors = residuals.estimate(state, links.take(candidates)).links.sum(axis=0)
+        group, ends = _families(tree, links, candidates, errors, _SMOOTHER * bound)
         yield
         if len(ends) == 0:
             return rows
-        members = rows[np.flatnonzero(group >= 0)]
+        members = candidates[np.flatnonzero(group >= 0)]
         family = group[group >= 0]
         order = np.argsort(family, kind="stable")
         members, family = members[order], family[order]
@@ -116,7 +125,6 @@ def _families(
     rows: IntArray,
     errors: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
     limit: float,
-    tried: BoolArray,
 ) -> tuple[IntArray, IntArray]:
     """Which of `rows` (n,) are whole sets of siblings with one partner, with errors below `limit` in sum.
 
@@ -128,7 +136,7 @@ def _families(
     n = np.int64(len(tree))
     for child, partner in ((links.p[rows], links.q[rows]), (links.q[rows], links.p[rows])):
         parent = tree.parent[child]
-        free = np.flatnonzero((parent >= 0) & (group < 0) & ~tried[rows])
+        free = np.flatnonzero((parent >= 0) & (group < 0))
         key = parent[free].astype(np.int64) * n + partner[free]
         known, place, count = np.unique(key, return_inverse=True, return_counts=True)
         whole = count == tree.child_count[(known // n).astype(np.int32)]

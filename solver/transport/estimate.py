@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,7 +45,7 @@ class ErrorEstimate:
     light: Light
     """of the elements"""
     norm: float
-    """squared luminance of what is reflected, times area"""
+    """squared luminance of what is reflected, times area; NaN where it was not asked for"""
 
     @property
     def relative(self) -> float:
@@ -114,14 +115,17 @@ class Residuals:
         )
 
     def estimate(self, state: TransportState, links: LinkTable | LinkBatch | None = None) -> ErrorEstimate:
-        """The errors of the given links (n,), or of all that there are.
+        """The errors of the given links (n,), without the norm, or of all that there are, with it.
 
         Emission is known and would only dilute a relative error, so that the norm leaves it out.
         """
-        tree = state.tree
+        tree, norm = state.tree, math.nan
+        leaf = tree.child < 0
         if links is None:
             links = state.links
-        leaf = tree.child < 0
+            reflected = state.radiosity[leaf, 0] @ state.weights
+            reflected -= (state.emission @ state.weights)[tree.patch[leaf]]
+            norm = float((tree.area[leaf] * reflected**2).sum())
         resolved = np.where(leaf, LEAF, 1.0)
         p, q, exchange, noise = links.p, links.q, links.open_exchange, links.noise
         residual_p, residual_q = links.residual_p, links.residual_q
@@ -136,13 +140,11 @@ class Residuals:
             )  # fmt: skip
 
         run_chunks(work, len(p), 1 << 15, 1 << 12)
-        reflected = state.radiosity[leaf, 0] @ state.weights
-        reflected -= (state.emission @ state.weights)[tree.patch[leaf]]
         return ErrorEstimate(
             links=errors,
             irradiance=np.maximum(mean[q] * residual_p, mean[p] * residual_q),
             light=self.light,
-            norm=float((tree.area[leaf] * reflected**2).sum()),
+            norm=norm,
         )
 
 
