@@ -37,10 +37,11 @@ class Progress:
 class ChangeLog:
     """All entries of a session, oldest first."""
 
-    def __init__(self) -> None:
-        self._entries: list[Change] = []
-        self._count = 0
-        self._dragged: Change | None = None
+    def __init__(self, entries: Sequence[Change] = (), count: int = 0, drags: bool = False) -> None:
+        """Go on from `entries` of the `count` that there were; the last one `drags`, if any does."""
+        self._entries = list(entries)
+        self._count = count
+        self._dragged = self._entries[-1] if drags and self._entries else None
         """The addition that stands for the last place of an object that was moved more than once, if it is
         the last entry"""
 
@@ -49,9 +50,18 @@ class ChangeLog:
         """Entries that there ever were, before consecutive moves were folded."""
         return self._count
 
+    @property
+    def drags(self) -> bool:
+        """Whether the last entry is the addition of an object that may be moved on."""
+        return self._dragged is not None
+
     def add(self, changes: Sequence[Change], progress: Progress) -> None:
         """Take in what an edit has changed, and remember how far those before it had got."""
         self._entries = list(_told(self._entries, progress))
+        self.recall(changes)
+
+    def recall(self, changes: Sequence[Change]) -> None:
+        """Take in what an edit changed of which nobody knows any more how far the light had followed."""
         for change in changes:
             self._append(change)
         self._count += len(changes)

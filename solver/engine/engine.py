@@ -7,6 +7,7 @@ whatever is asked next sees the new geometry, with the light that is still valid
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Sequence
 
@@ -18,11 +19,12 @@ from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
-from solver.engine.history import History, Step, step_of
+from solver.engine.history import Step, step_of
 from solver.engine.instant.frames import InstantFrames
 from solver.engine.lightmaps.bake import Bake, LightmapRequest
 from solver.engine.lightmaps.begin import begin_bake
 from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
+from solver.engine.past import Past
 from solver.engine.paths import PathFrames
 from solver.engine.picking import PickResult, pick_point
 from solver.engine.probing import light_at
@@ -63,33 +65,36 @@ class Engine:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Scene | Past,
         settings: LightSettings | None = None,
         limits: SceneLimits | None = None,
         drawing: Drawing | None = None,
         frame_limits: FrameLimits | None = None,
     ) -> None:
-        """Take `scene` as revision 1. `drawing` makes the frames, and may be shared by engines of one thread.
+        """Take `scene` as revision 1, or go on from a past with light that settles anew.
 
-        Raises LimitExceededError.
+        `drawing` makes the frames, and may be shared by engines of one thread. Raises LimitExceededError, and
+        SceneError where a past has an edit that cannot be applied.
         """
+        past = scene if isinstance(scene, Past) else Past(scene)
         self._limits = limits or SceneLimits()
-        self._limits.check(scene)
+        self._history, standing = past.history(self._limits)
         self._frame_limits = frame_limits or FrameLimits()
         self._settings = settings or LightSettings()
         self._drawing = drawing or Drawing()
         self._fine: FineLight | None = None
         self._gathers: GatherFrames | None = None
         self._instant: InstantFrames | None = None
-        self._revision = 1
-        self._history = History()
-        self._log = ChangeLog()
+        self._revision = past.revision
+        self._log = ChangeLog(past.entries, past.count, past.drags)
+        self._life = secrets.token_hex(4)
+        """Sets the tags of its frames apart from those that the session had in an earlier process"""
         self._turn = 0
         self._memory = Memory()
         self._seen: Interpolants | None = None
         """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
-        self._settle(World.of(scene), None, False)
+        self._settle(World.of(standing), None, False)
 
     @property
     def scene(self) -> Scene:
@@ -332,7 +337,7 @@ class Engine:
 
     def _outlook(self, request: FrameRequest, view: View) -> Outlook:
         return Outlook(
-            tag=f"{self._turn}.{view.version}",
+            tag=f"{self._life}.{self._turn}.{view.version}",
             renderer=_renderer_of(request),
             revision=self._revision,
             error_estimate=view.error_estimate,

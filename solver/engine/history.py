@@ -6,7 +6,7 @@ Scenes are immutable and share what they have in common, so that the scene befor
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -54,6 +54,15 @@ class History:
         self._past: deque[tuple[Scene, Step]] = deque(maxlen=KEPT)
         self._future: list[tuple[Scene, Step]] = []
 
+    @classmethod
+    def of(cls, past: Iterable[tuple[Scene, Step]], future: Iterable[tuple[Scene, Step]]) -> History:
+        """The history of steps, each with the scene before it: those that stand, oldest first, and those that
+        were taken back, the latest last."""
+        history = cls()
+        history._past.extend(past)
+        history._future.extend(future)
+        return history
+
     def record(self, before: Scene, step: Step) -> None:
         """Take in a step of the client's own; what was taken back before cannot be brought back any more."""
         self._past.append((before, step))
@@ -65,8 +74,7 @@ class History:
             raise NothingToReverseError("undo")
         before, step = self._past.pop()
         self._future.append((before, step))
-        deeds = (Deed(_INVERSE.get(deed.op, deed.op), deed.object_id) for deed in reversed(step.deeds))
-        return Step(before, tuple(deeds))
+        return Step(before, taken_back(step.deeds))
 
     def redo(self) -> Step:
         """The step that brings back what was taken back last. Raises NothingToReverseError."""
@@ -79,4 +87,14 @@ class History:
 
 def step_of(edits: Sequence[Edit], scene: Scene) -> Step:
     """The step of `edits` to `scene`."""
-    return Step(scene, tuple(Deed(edit.op, edit.object_id) for edit in edits))
+    return Step(scene, deeds_of(edits))
+
+
+def deeds_of(edits: Sequence[Edit]) -> tuple[Deed, ...]:
+    """What `edits` do, in their order."""
+    return tuple(Deed(edit.op, edit.object_id) for edit in edits)
+
+
+def taken_back(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """What takes back `deeds`, in its order."""
+    return tuple(Deed(_INVERSE.get(deed.op, deed.op), deed.object_id) for deed in reversed(deeds))
