@@ -48,6 +48,10 @@ class ServiceSettings(BaseSettings):
     )
     max_sessions: _Count = Field(default=16, description="Sessions at once.")
     max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
+    max_message_bytes: _Count = Field(default=4 * 2**20, description="Bytes of a message on a stream.")
+    stream_idle_seconds: float = Field(
+        default=120.0, gt=0.0, description="A stream on which nothing has come for this long is closed."
+    )
     max_polygons: _Count = Field(default=20_000, description="Faces of a scene.")
     max_vertices: _Count = Field(default=200_000, description="Vertices, or corners of faces, of a scene.")
     max_elements: _Count = Field(

@@ -36,6 +36,28 @@ class Metrics:
             buckets=_SECONDS,
             registry=self._registry,
         )
+        self.stream_clients = Gauge(
+            "halflight_stream_clients", "Connections of streams", registry=self._registry
+        )
+        self.stream_frames = Counter(
+            "halflight_stream_frames", "Frames sent on streams", ["quality"], registry=self._registry
+        )
+        self.stream_bytes = Counter(
+            "halflight_stream_bytes", "Bytes of frames sent on streams", registry=self._registry
+        )
+        self.stream_latency = Histogram(
+            "halflight_stream_latency_seconds",
+            "From a camera or an edit until the frame that shows it is handed to the connection",
+            ["quality"],
+            buckets=_SECONDS,
+            registry=self._registry,
+        )
+        self.stream_round_trips = Histogram(
+            "halflight_stream_round_trip_seconds",
+            "From a frame until its acknowledgement",
+            buckets=_SECONDS,
+            registry=self._registry,
+        )
         self.requests = Histogram(
             "halflight_request_seconds",
             "Time to answer a request",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, TypeAlias, get_args
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -58,6 +58,8 @@ NOT_READY: Final = Kind("not-ready", 409, "What was asked for is not there yet")
 LIMIT: Final = Kind("limit-exceeded", 413, "More than the limit was asked for")
 TOO_MANY_SESSIONS: Final = Kind("too-many-sessions", 429, "There are too many sessions")
 UNAUTHORIZED: Final = Kind("unauthorized", 401, "A bearer token is needed")
+FORBIDDEN: Final = Kind("forbidden", 403, "This is not allowed")
+UPGRADE: Final = Kind("upgrade-required", 426, "This call takes another protocol")
 NOT_AVAILABLE: Final = Kind("not-available", 501, "This version cannot do that yet")
 WORKER_GONE: Final = Kind("worker-gone", 503, "The session's worker is gone")
 NO_RENDERING: Final = Kind("no-rendering", 503, "This machine cannot draw frames")
@@ -134,19 +136,68 @@ class ProblemError(HTTPException):
             return cls.of_field(kind, [source, *refusal.location], refusal.detail)
         return cls(kind, refusal.detail)
 
+    @classmethod
+    def of_fields(cls, found: Sequence[Mapping[str, Any]]) -> ProblemError:
+        """Input that a model refused; `found` are pydantic's errors, located from the source on."""
+        fields = [
+            FieldProblem(loc=_location(error), msg=_PLAIN_MESSAGE.get(error["type"], error["msg"]))
+            for error in found[:MAX_ERRORS]
+        ]
+        return cls(INVALID, _tell(fields), fields)
 
-def respond(
-    kind: Kind, detail: str, errors: Sequence[FieldProblem] = (), headers: Mapping[str, str] | None = None
-) -> JSONResponse:
-    """The response that tells a problem."""
-    problem = Problem(
+    @classmethod
+    def of_error(cls, error: ToldError, source: str) -> ProblemError:
+        """What was raised on purpose while input from `source` was served: body, query or message."""
+        match error:
+            case ProblemError():
+                return error
+            case RefusedError():
+                return cls.of_refusal(error.refusal, source)
+            case LimitExceededError():
+                return cls(LIMIT, str(error))
+            case NoSuchSessionError():
+                return cls(NO_SUCH_SESSION, str(error))
+            case TooManySessionsError():
+                return cls(TOO_MANY_SESSIONS, str(error))
+            case WorkerGoneError():
+                return cls(WORKER_GONE, str(error))
+
+    @property
+    def problem(self) -> Problem:
+        """What a client is told."""
+        return _problem(self.kind, str(self.detail), self.errors)
+
+
+ToldError: TypeAlias = (
+    ProblemError
+    | RefusedError
+    | LimitExceededError
+    | NoSuchSessionError
+    | TooManySessionsError
+    | WorkerGoneError
+)
+"""What is raised to be told a client"""
+
+TOLD: Final[tuple[type[ToldError], ...]] = get_args(ToldError)
+"""The same, to be caught"""
+
+
+def _problem(kind: Kind, detail: str, errors: Sequence[FieldProblem]) -> Problem:
+    return Problem(
         type=f"urn:halflight:{kind.name}" if kind.name else "about:blank",
         title=kind.title,
         status=kind.status,
         detail=detail,
         errors=list(errors) or None,
     )
-    return JSONResponse(problem.model_dump(exclude_none=True), kind.status, headers, MEDIA_TYPE)
+
+
+def respond(
+    kind: Kind, detail: str, errors: Sequence[FieldProblem] = (), headers: Mapping[str, str] | None = None
+) -> JSONResponse:
+    """The response that tells a problem."""
+    told = _problem(kind, detail, errors).model_dump(exclude_none=True)
+    return JSONResponse(told, kind.status, headers, MEDIA_TYPE)
 
 
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -171,32 +222,18 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def of_input(_: Request, error: RequestValidationError) -> JSONResponse:
-        fields = [
-            FieldProblem(loc=_location(found), msg=_PLAIN_MESSAGE.get(found["type"], found["msg"]))
-            for found in error.errors()[:MAX_ERRORS]
-        ]
-        return respond(INVALID, _tell(fields), fields)
-
-    @app.exception_handler(RefusedError)
-    async def of_refusal(request: Request, error: RefusedError) -> JSONResponse:
-        told = ProblemError.of_refusal(error.refusal, "query" if request.method == "GET" else "body")
+        told = ProblemError.of_fields(error.errors())
         return respond(told.kind, told.detail, told.errors)
 
-    @app.exception_handler(LimitExceededError)
-    async def of_limit(_: Request, error: LimitExceededError) -> JSONResponse:
-        return respond(LIMIT, str(error))
+    async def of_told(request: Request, error: Exception) -> JSONResponse:
+        if not isinstance(error, TOLD):
+            raise error
+        told = ProblemError.of_error(error, "query" if request.method == "GET" else "body")
+        return respond(told.kind, told.detail, told.errors)
 
-    @app.exception_handler(NoSuchSessionError)
-    async def of_session(_: Request, error: NoSuchSessionError) -> JSONResponse:
-        return respond(NO_SUCH_SESSION, str(error))
-
-    @app.exception_handler(TooManySessionsError)
-    async def of_count(_: Request, error: TooManySessionsError) -> JSONResponse:
-        return respond(TOO_MANY_SESSIONS, str(error))
-
-    @app.exception_handler(WorkerGoneError)
-    async def of_worker(_: Request, error: WorkerGoneError) -> JSONResponse:
-        return respond(WORKER_GONE, str(error))
+    for kind in TOLD:
+        if kind is not ProblemError:
+            app.add_exception_handler(kind, of_told)
 
     @app.exception_handler(ClientGoneError)
     async def of_nobody(_: Request, __: ClientGoneError) -> Response:

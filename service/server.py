@@ -26,10 +26,17 @@ class Server(uvicorn.Server):
     """
 
     def __init__(self, app: FastAPI, address: str) -> None:
-        super().__init__(
-            uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=_GRACE)
-        )
         self._context = _context(app)
+        super().__init__(
+            uvicorn.Config(
+                app,
+                log_level="warning",
+                access_log=False,
+                timeout_graceful_shutdown=_GRACE,
+                ws_max_size=self._context.settings.max_message_bytes,
+                ws_per_message_deflate=False,  # frames are compressed already
+            )
+        )
         self._address = address
 
     async def run_on(self, listening: socket.socket) -> None:

@@ -25,11 +25,12 @@ from service.hosting.messages import (
     SceneAnswer,
     Undo,
 )
+from service.hosting.pictures import Picture, picture, presented
 from solver.engine.drawing import encode
 from solver.engine.engine import Engine
 from solver.engine.history import NothingToReverseError
 from solver.engine.overlays.base import NotReadyError
-from solver.engine.requests import NotAvailableError
+from solver.engine.requests import FrameRequest, NotAvailableError
 from solver.engine.views import Outlook
 from solver.errors import (
     LimitExceededError,
@@ -75,19 +76,39 @@ def answer(engine: Engine, request: AnyRequest) -> object:
 
 def answer_frame(engine: Engine, request: GetFrame) -> FrameAnswer:
     """The frame as well as it can be drawn now; not drawn if the client has it. Raises one of REFUSED."""
-    outlook = engine.outlook(request.frame)
+    wanted = drawn(engine, request)
+    outlook = engine.outlook(wanted)
     tag = _tag(outlook, request)
     if tag in request.known_tags:
         return FrameAnswer(None, tag, outlook, 0.0)
-    frame = engine.frame(request.frame)
-    content = encode(frame.image, request.frame.layer, request.encoding)
-    return FrameAnswer(content, _tag(frame.outlook, request), frame.outlook, frame.seconds)
+    frame = engine.frame(wanted)
+    if request.presentation is None:
+        shown = Picture(encode(frame.image, wanted.layer, request.encoding))
+    else:
+        shown = picture(frame.image, request.frame.layer, request.encoding, request.presentation)
+    height, width = frame.image.shape[:2]
+    return FrameAnswer(
+        shown.content,
+        _tag(frame.outlook, request),
+        frame.outlook,
+        frame.seconds,
+        width,
+        height,
+        shown.scale_maximum,
+    )
+
+
+def drawn(engine: Engine, request: GetFrame) -> FrameRequest:
+    """What is drawn to answer `request`. Raises one of REFUSED."""
+    if request.presentation is None:
+        return request.frame
+    return presented(engine, request.frame, request.presentation)
 
 
 def _tag(outlook: Outlook, request: GetFrame) -> str:
     """An entity tag: the same for the same picture in the same encoding."""
     shown = replace(request.frame, max_error=math.inf)  # how good it was to be is no part of a picture
-    asked = f"{outlook.tag} {shown} {request.encoding}"
+    asked = f"{outlook.tag} {shown} {request.encoding} {request.presentation}"
     return hashlib.blake2s(asked.encode(), digest_size=12).hexdigest()
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from service.hosting.pictures import Presentation
 from solver.document.edits import Edit
 from solver.document.fields import Location
 from solver.document.limits import SceneLimits
@@ -111,6 +112,11 @@ class FrameAnswer:
     outlook: Outlook
     seconds: float
     """What drawing it took"""
+    width: int = 0
+    height: int = 0
+    """Pixels; 0 without content"""
+    scale_maximum: float | None = None
+    """Lux at the end of the scale of false colours; None where that is not known"""
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,8 @@ class GetFrame(Request[FrameAnswer]):
     """Seconds"""
     known_tags: frozenset[str]
     """Frames of these tags need not be sent"""
+    presentation: Presentation | None = None
+    """How a stream shows it; None: as it is"""
 
 
 @dataclass(frozen=True)

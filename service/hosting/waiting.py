@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from service.hosting.answers import answer_frame
+from service.hosting.answers import answer_frame, drawn
 from service.hosting.messages import (
     FrameAnswer,
     GetFrame,
@@ -47,7 +47,7 @@ class WaitingFrame:
 
     def poll(self, engine: Engine) -> FrameAnswer | None:
         """The frame, if it is as good as asked or its time is up; drawing one takes what it takes."""
-        worth = engine.outlook(self._request.frame).is_worth(self._request.wait)
+        worth = engine.outlook(drawn(engine, self._request)).is_worth(self._request.wait)
         if not worth and time.monotonic() < self.deadline:
             return None
         return answer_frame(engine, self._request)

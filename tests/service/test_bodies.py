@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import pytest
 from fastapi.testclient import TestClient
-from starlette.testclient import WebSocketDenialResponse
 
 from service.json_body import parse_json
 from tests.engine.scenes import box_document
@@ -160,24 +159,6 @@ def test_unknown_sessions_are_not_found(client: TestClient, method: str, call: s
         assert answer.status_code in {404, 405}, "the client itself has taken the dots away"
     else:
         problem_of(answer, 404)
-
-
-@pytest.mark.parametrize(("method", "call"), CALLS[-1:])
-def test_calls_that_are_still_to_come_say_so(
-    client: TestClient, settled: str, method: str, call: str
-) -> None:
-    assert (
-        problem_of(client.request(method, f"{settled}{call}"), 501)["type"] == "urn:halflight:not-available"
-    )
-
-
-def test_the_stream_is_still_to_come(client: TestClient, settled: str) -> None:
-    for path, status in ((settled, 501), ("/v1/sessions/none", 404)):
-        with pytest.raises(WebSocketDenialResponse) as denied, client.websocket_connect(f"{path}/stream"):
-            pass
-        answer = denied.value
-        assert answer.headers["content-type"] == "application/problem+json"
-        assert answer.status_code == status
 
 
 # --- the parser by itself ---
