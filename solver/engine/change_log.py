@@ -55,9 +55,13 @@ class ChangeLog:
         """Whether the last entry is the addition of an object that may be moved on."""
         return self._dragged is not None
 
-    def add(self, changes: Sequence[Change], progress: Progress) -> None:
-        """Take in what an edit has changed, and remember how far those before it had got."""
-        self._entries = list(_told(self._entries, progress))
+    def add(self, changes: Sequence[Change], progress: Progress | None) -> None:
+        """Take in what an edit has changed, and remember how far those before it had got.
+
+        Without `progress` nothing has happened since the last one.
+        """
+        if progress is not None:
+            self._entries = list(_told(self._entries, progress))
         self.recall(changes)
 
     def recall(self, changes: Sequence[Change]) -> None:

@@ -94,6 +94,12 @@ class Engine:
         self._seen: Interpolants | None = None
         """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
+        """What the edits since the last transition, or those of it, have moved, if nothing else"""
+        self._drags = False
+        self._is_behind = False
+        """Whether the solution is that of an earlier world"""
+        self._power: dict[ObjectId, float] = {}
+        """W of luminance that left each object before the last transition"""
         self._settle(World.of(standing), None, False)
 
     @property
@@ -136,10 +142,12 @@ class Engine:
 
     def log(self) -> tuple[Change, ...]:
         """The change log as it stands, oldest entries first."""
+        self._catch_up()
         return self._log.entries(self._progress())
 
     def configure(self, settings: LightSettings) -> None:
         """Solve on by other settings."""
+        self._catch_up()
         if settings == self._settings:
             return
         before, self._settings = self._settings, settings
@@ -154,6 +162,7 @@ class Engine:
 
         So, when it is False, whoever waits for something has seen what the last of the work came to.
         """
+        self._catch_up()
         solving = self._solution.state is SessionState.SOLVING
         refining = self._fine is not None and self._fine.step(0.5 * budget)
         gathering = self._gathers is not None and self._gathers.step(0.5 * budget)
@@ -167,11 +176,13 @@ class Engine:
 
     def build_everything(self) -> None:
         """Build the interpolants of all triangles, seen or not, once there are any."""
+        self._catch_up()
         if self._fine is not None and self._fine.interpolants is not None:
             self._fine.build(np.arange(len(self._fine.interpolants.triangulation.triangles), dtype=np.int32))
 
     def status(self) -> EngineStatus:
         """How the session stands."""
+        self._catch_up()
         solution, solver = self._solution, self._solution.solver
         return EngineStatus(
             name=self.scene.name,
@@ -196,6 +207,7 @@ class Engine:
 
         Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
         """
+        self._catch_up()
         return self._outlook(request, self._view(request))
 
     def frame(self, request: FrameRequest) -> Frame:
@@ -203,6 +215,7 @@ class Engine:
 
         Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
         """
+        self._catch_up()
         view = self._view(request)
         start = time.perf_counter()
         image = view.draw()
@@ -210,6 +223,7 @@ class Engine:
 
     def probe(self, positions: Points, normals: FloatArray) -> ProbeResult:
         """Measure the light at points (n, 3) with normals (n, 3) of any length, as `light_at` does."""
+        self._catch_up()
         unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         found, error = light_at(self._solution, self._fine_light(), self._settings, positions, unit)
         return ProbeResult(
@@ -225,6 +239,7 @@ class Engine:
         Raises SceneError naming x or y for a pixel outside the frame, or the camera's field;
         LimitExceededError, RenderingUnavailableError.
         """
+        self._catch_up()
         chosen = self._camera(camera)
         fine = self._fine_light()
         mesh = None if fine is None else fine.mesh()
@@ -237,10 +252,12 @@ class Engine:
         Raises NotReadyError where it never can be, SceneError, LimitExceededError,
         RenderingUnavailableError.
         """
+        self._catch_up()
         return is_ready(request.overlay, self._subject(request), complete)
 
     def overlay(self, request: OverlayRequest) -> Work:
         """Show an overlay that is ready, in slices of a few milliseconds. Raises as `Overlay.show`."""
+        self._catch_up()
         self._solution.lend()
         return request.overlay.show(self._subject(request))
 
@@ -249,6 +266,7 @@ class Engine:
 
         An edit leaves it as it is, of the revision before. Raises NotReadyError where it never can be made.
         """
+        self._catch_up()
         self._solution.lend()
         return begin_bake(request, self._revision, self._solution, self._fine_light(), self._settings)
 
@@ -279,6 +297,7 @@ class Engine:
         if self._instant is not None:
             self._instant.follow(world)
         self._turn += 1
+        self._is_behind = False
 
     def _view(self, request: FrameRequest) -> View:
         renderer = _renderer_of(request)
@@ -347,16 +366,29 @@ class Engine:
         )
 
     def _take(self, step: Step) -> tuple[Change, ...]:
-        """Go on in the scene that `step` leads to."""
+        """Go on in the scene that `step` leads to. What that does to the light is found out when asked for.
+
+        So a burst of edits costs one transition, and none waits for those before it.
+        """
         world = World.of(step.scene, self._world)
-        before = self._progress()
+        before = None
+        moved, drags = _moved_alone(step), self._drags
+        if not self._is_behind:
+            before, self._power = self._progress(), self._solution.power_by_object()
+            drags = moved is not None and moved == self._moved
+            self._moved = moved
+        elif moved != self._moved:
+            drags, self._moved = False, None
         self._revision += 1
-        moved = _moved_alone(step)
-        self._settle(world, self._solution, drags=moved is not None and moved == self._moved)
-        self._moved = moved
-        changes = self._changes(step)
+        self._world, self._drags, self._is_behind = world, drags, True
+        changes = self._changes(step, world)
         self._log.add(changes, before)
-        return self._log.entries(self._progress())[-len(changes) :]
+        return changes
+
+    def _catch_up(self) -> None:
+        """Let the solution be that of the world as it stands."""
+        if self._is_behind:
+            self._settle(self._world, self._solution, self._drags)
 
     def _progress(self) -> Progress:
         solver, shots = self._solution.solver, self._solution.solver.shots
@@ -370,7 +402,8 @@ class Engine:
             is_settled=False,
         )
 
-    def _changes(self, step: Step) -> tuple[Change, ...]:
+    def _changes(self, step: Step, after: World) -> tuple[Change, ...]:
+        emitted = after.emission_by_object()
         return tuple(
             Change(
                 entry=self._log.count + number,
@@ -378,7 +411,7 @@ class Engine:
                 op=deed.op,
                 id=deed.object_id,
                 state=ChangeState.PENDING,
-                energy_to_redistribute=0.0,
+                energy_to_redistribute=self._power.get(deed.object_id, emitted.get(deed.object_id, 0.0)),
                 shots=0,
             )
             for number, deed in enumerate(step.deeds, 1)

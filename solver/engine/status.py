@@ -87,7 +87,8 @@ class Change:
     state: ChangeState
     energy_to_redistribute: float
     """W of luminance at stake: of links that have not been looked at since the change, were they open, and
-    its share of what is received but not propagated yet."""
+    its share of what is received but not propagated yet. Before anything is known: what left the object, or
+    what an object that is added emits."""
     shots: int
     """Links over which the change has been shot so far."""
 

@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from solver.geometry.scene import Scene
 from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import SolveOutcome
+from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 from tests.pathtracing.worlds import material
 from tests.redistribution.rooms import crate, difference, edited, fresh, placed, room, settled
@@ -98,7 +99,10 @@ class Edits(RuleBasedStateMachine):
             assert sum(self.solver.owed().values()) == 0.0
         expected = settled(fresh(self.scene))
         estimates = self.solver.error_estimate, expected.error_estimate
-        assert difference(self.solver, expected) <= np.hypot(*estimates)
+        if difference(self.solver, expected) > np.hypot(*estimates):
+            # Estimates of coarse solves fall short of the error where a lamp is close to a bright ceiling.
+            truth = settled(fresh(self.scene, SolverSettings(error_tolerance=0.01)))
+            assert difference(self.solver, truth) <= 1.1 * difference(expected, truth)
         links = self.solver.state.links
         for name in ("p", "q"):
             assert getattr(links, name).max(initial=-1) < len(self.solver.state.tree)
