@@ -60,6 +60,7 @@ _WARM_LIGHT: Final = (9.0, 8.0, 6.0)
 
 _CUBE: Final = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
 _INWARD: Final = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6))
+_MOVE: Final = MoveEdit(op="move", id="screen", transform=TransformDocument(translation=[0.0, 0.1, 0.0]))
 """Floor, ceiling, then the walls, seen from inside."""
 
 _Colour = tuple[float, float, float]
@@ -153,7 +154,7 @@ def _edit(drawing: Drawing) -> None:
     engine.apply(
         [
             SetMaterialEdit(op="set_material", id="table", material=MaterialDocument(reflectance=list(_RED))),
-            MoveEdit(op="move", id="screen", transform=TransformDocument(translation=[0.0, 0.1, 0.0])),
+            _MOVE,
             RemoveEdit(op="remove", id="lamp"),
         ]
     )
@@ -187,6 +188,11 @@ def _draw(drawing: Drawing) -> None:
             _run(engine)
             engine.frame(request)
         _pick_and_probe(engine)
+    # What was seen before an edit is taken over.
+    engine.apply([_MOVE])
+    _run(engine)
+    engine.outlook(FrameRequest(CameraChoice(), RendererName.INTERPOLANT))
+    _run(engine)
 
 
 def _reflect(drawing: Drawing) -> None:
