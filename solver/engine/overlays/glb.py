@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 import pygltflib as gltf
 
-from solver.engine.overlays.buffers import UNLIT, Buffers
 from solver.engine.overlays.shapes import Primitives, Shapes
+from solver.formats.gltf.buffers import UNLIT, Buffers
 
 _BYTE: Final = 255.0
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 import pygltflib as gltf
 
-from solver.engine.overlays.buffers import UNLIT, Buffers
+from solver.formats.gltf.buffers import UNLIT, Buffers
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.lightmaps.atlas import Atlas
 from solver.types import FloatArray, IntArray

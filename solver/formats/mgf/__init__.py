@@ -1,0 +1,1 @@
+"""MGF, the Materials and Geometry Format of Greg Ward: scenes by physical quantities, as text."""
