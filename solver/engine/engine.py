@@ -10,6 +10,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -58,6 +59,9 @@ from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
 from solver.transport.solve import RadiositySolver
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
+
+_FIRST_LOOK: Final = 0.02
+"""Seconds of work before the first frame after an edit: in it the strongest shadows have moved."""
 
 
 class Engine:
@@ -207,7 +211,7 @@ class Engine:
 
         Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
         """
-        self._catch_up()
+        self._catch_up(_FIRST_LOOK)
         return self._outlook(request, self._view(request))
 
     def frame(self, request: FrameRequest) -> Frame:
@@ -215,7 +219,7 @@ class Engine:
 
         Raises NotAvailableError, SceneError, LimitExceededError, RenderingUnavailableError.
         """
-        self._catch_up()
+        self._catch_up(_FIRST_LOOK)
         view = self._view(request)
         start = time.perf_counter()
         image = view.draw()
@@ -385,10 +389,12 @@ class Engine:
         self._log.add(changes, before)
         return changes
 
-    def _catch_up(self) -> None:
-        """Let the solution be that of the world as it stands."""
+    def _catch_up(self, first_look: float = 0.0) -> None:
+        """Let the solution be that of the world as it stands; if it was not, work on it for some seconds."""
         if self._is_behind:
             self._settle(self._world, self._solution, self._drags)
+            if first_look > 0.0:
+                self._solution.step(first_look)
 
     def _progress(self) -> Progress:
         solver, shots = self._solution.solver, self._solution.solver.shots

@@ -22,8 +22,9 @@ from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.redistribution.carrying import carry, moments_of
 from solver.redistribution.debts import UnlinkedPairs, owe
-from solver.redistribution.energy import doubt_of, energies_at_stake, unshot_square
+from solver.redistribution.energy import doubt_of, rank_links, unshot_square
 from solver.redistribution.matching import Match, match_patches
+from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, unneeded
 from solver.transport.estimate import Residuals
@@ -117,6 +118,13 @@ class Redistribution(RadiositySolver):
         )
         self._fresh = match.fresh
         before = earlier.trace if isinstance(earlier, Redistribution) and not anew else None
+        self._number = number
+        self._boxes = np.concatenate(
+            [
+                boxes_around(earlier.surfaces.corners[match.gone], earlier.surfaces.object[match.gone]),
+                boxes_around(surfaces.corners[match.fresh], surfaces.object[match.fresh]),
+            ]
+        )
         self.trace: Trace = Trace.after(before, match, carried)
         """What has happened since the last solution that somebody looked at closely"""
         self._guess = self._state.received[self._fresh, 0].copy()
@@ -281,16 +289,25 @@ class Redistribution(RadiositySolver):
         radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
         reflectance = (state.reflectance @ state.weights)[tree.patch]
         p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
-        energy = np.empty(len(p))
-        energies_at_stake(
-            p, q, np.concatenate([links.open_exchange[rows], np.zeros(len(pairs))]), tree.area, tree.centroid,
-            tree.patch, self.surfaces.normal, radiosity, reflectance, energy,
-        )  # fmt: skip
+        energy, urgency = np.empty((2, len(p)))
+        known = np.abs(links.debt[rows]) == self._number
+        # What hides links that are in debt to earlier edits is not known any more.
+        for chosen, boxes in (
+            (np.flatnonzero(known), self._boxes),
+            (np.append(np.flatnonzero(~known), np.arange(len(rows), len(p))), self._boxes[:0]),
+        ):
+            exchange = np.append(links.open_exchange[rows], np.zeros(len(pairs)))[chosen]
+            found = np.empty((2, len(chosen)))
+            rank_links(
+                p[chosen], q[chosen], exchange, tree.area, tree.centroid, tree.patch, self.surfaces.normal,
+                radiosity, reflectance, boxes, found[0], found[1],
+            )  # fmt: skip
+            energy[chosen], urgency[chosen] = found
         # What an emitter sends out that came with the edit is what everybody looks at.
         first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
         first[self._fresh] = state.emission[self._fresh].any(axis=1)
         lit = first[tree.patch[p]] | first[tree.patch[q]]
-        order = np.lexsort((-energy, ~lit))
+        order = np.lexsort((-urgency, ~lit))
         paired = order[order >= len(rows)] - len(rows)
         self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
         self._plan = _Plan(
