@@ -31,8 +31,8 @@ def rank_links(
     energy: FloatArray,
     urgency: FloatArray,
 ) -> None:
-    """W (k,) of luminance that pairs of elements p, q (k,) reflect of each other's light at most; and the part
-    of it that something can have hidden or shown, squared, over the area that it falls on, (W/m2)^2 m2.
+    """W (k,) of luminance that pairs of elements p, q (k,) reflect of each other's light, at most; and the
+    part of it that something can have hidden or shown, squared, over the area it falls on, (W/m2)^2 m2.
 
     exchange (k,) m2 where it is known, 0 where it is not: then the elements are taken for points, but for
     no more than the smaller one's area. boxes (n, 2, 3): what came or went between the ends; of none, all of

@@ -105,7 +105,7 @@ class Redistribution(RadiositySolver):
         self._state = carried.state
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
-        self.bound = earlier.bound
+        self.bound, self.pace = earlier.bound, earlier.pace
         self.linked = surfaces.patch_count
         self.lean: int = earlier.lean if isinstance(earlier, Redistribution) else len(earlier.state.links)
         """Links when all of them were last looked at for mergers"""
@@ -185,7 +185,7 @@ class Redistribution(RadiositySolver):
         since = 0
         old = len(state.links)
         yield True
-        for part in self._pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
+        for part in self.pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
             seen = plan.rows[part][plan.rows[part] >= 0]
             left = seen[state.links.debt[seen] > 0]
             changed.append(self._look_again(seen, plan.light, moments))
@@ -255,7 +255,7 @@ class Redistribution(RadiositySolver):
         rows, merging = self._new, self._faded
         if full:
             rows = merging = np.arange(len(state.links), dtype=np.int32)
-        work = coarsen(state, self._linker, self._pace, rows, merging, residuals, self.bound)
+        work = coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound)
         while True:
             try:
                 next(work)

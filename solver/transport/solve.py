@@ -99,7 +99,7 @@ class RadiositySolver(SlicedSolve):
         super().__init__(surfaces, settings)
         self._rays = rays
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
-        self._pace = Pace()
+        self.pace = Pace()
         self._state = TransportState.of(surfaces)
         self._closed = False
         self._ray_count = 0
@@ -261,7 +261,7 @@ class RadiositySolver(SlicedSolve):
 
     def _refine(self, light: Light, choice: Choice) -> Generator[bool, None, IntArray]:
         """Refine the chosen links; returns the rows of those that came for them."""
-        work = refine(self._state, self._linker, self._pace, light, choice)
+        work = refine(self._state, self._linker, self.pace, light, choice)
         # The leaves are others from the first slice on.
         self.version += 1
         while True:
@@ -303,7 +303,7 @@ class RadiositySolver(SlicedSolve):
             p, q = self._linker.facing_pairs(everything, everything, start, min(start + rows, n))
             yield True
             batches = []
-            for part in self._pace.batches(np.ones(len(p), dtype=np.int64)):
+            for part in self.pace.batches(np.ones(len(p), dtype=np.int64)):
                 batches.append(self._linker.link(self._state.tree, p[part], q[part], light))
                 self._ray_count += STRATA * int(batches[-1].samples.sum())
                 # Rows get shorter towards the end, since each pair is looked at once.
