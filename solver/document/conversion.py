@@ -41,7 +41,12 @@ def scene_of(document: SceneDocument) -> Scene:
         if entry.id in objects:
             raise DuplicateObjectError(entry.id, (*where, "id"))
         objects[entry.id] = object_of(entry, where)
-    scene = Scene(objects=objects, name=document.name, luminous_efficacy=document.luminous_efficacy)
+    scene = Scene(
+        objects=objects,
+        name=document.name,
+        luminous_efficacy=document.luminous_efficacy,
+        notes=tuple(document.notes),
+    )
     cameras = document.cameras or {DEFAULT_CAMERA: CameraDocument()}
     seen = {name: camera_of(camera, scene, ("cameras", name)) for name, camera in cameras.items()}
     return replace(scene, cameras=seen)
@@ -154,6 +159,7 @@ def document_of(scene: Scene) -> SceneDocument:
         luminous_efficacy=scene.luminous_efficacy,
         objects=[_object_document(o) for o in scene],
         cameras={name: _camera_document(camera) for name, camera in scene.cameras.items()},
+        **({"notes": list(scene.notes)} if scene.notes else {}),
     )
 
 

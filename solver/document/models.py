@@ -6,6 +6,8 @@ The models check each field by itself; `solver.document.conversion` checks how f
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -138,4 +140,10 @@ class SceneDocument(Closed):
     objects: list[ObjectDocument] = Field(default=[])
     cameras: dict[Identifier, CameraDocument] = Field(
         default={}, description="By name. Without any there is one, `main`, that overlooks the scene."
+    )
+    notes: list[Annotated[str, Field(strict=True, max_length=1000)]] = Field(
+        default=[],
+        max_length=100,
+        description="What a user should know of where the scene has come from, told among the warnings of "
+        "its sessions. Files of other formats are read with a note on all that could not be kept.",
     )

@@ -18,8 +18,10 @@ from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
 from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
+from solver.engine.exports.files import Export, ExportRequest, encode_export
 from solver.engine.fine import FineLight
 from solver.engine.gathers import GatherFrames
+from solver.engine.grids import Grid, GridRequest, grid_of
 from solver.engine.history import Step, step_of
 from solver.engine.instant.frames import InstantFrames
 from solver.engine.lightmaps.bake import Bake, LightmapRequest
@@ -203,7 +205,7 @@ class Engine:
 
     def _warnings(self) -> tuple[str, ...]:
         failure = None if self._fine is None else self._fine.failure
-        told = self._solution.warnings
+        told = (*self.scene.notes, *self._solution.warnings)
         return told if failure is None else (*told, failure)
 
     def outlook(self, request: FrameRequest) -> Outlook:
@@ -235,6 +237,21 @@ class Engine:
             irradiance=found,
             illuminance=self.scene.luminous_efficacy * (found @ LUMINANCE_WEIGHTS),
             error_estimate=error,
+        )
+
+    def measure(self, request: GridRequest) -> tuple[Grid, ProbeResult]:
+        """Measure the light over a grid of points, as `probe` does. Raises SceneError, LimitExceededError."""
+        grid = grid_of(self.scene, request)
+        return grid, self.probe(grid.positions, grid.normals)
+
+    def export(self, request: ExportRequest) -> Export:
+        """The session as a file for other programs, with the light as far as it has come."""
+        self._catch_up()
+        return Export(
+            content=encode_export(request, self._revision, self._world, self._solution),
+            revision=self._revision,
+            error_estimate=self._solution.error_estimate,
+            converged=self._solution.state is SessionState.CONVERGED,
         )
 
     def pick(self, camera: CameraChoice, x: int, y: int) -> PickResult:

@@ -33,6 +33,7 @@ _TRIANGLES_A_POLYGON: Final = 16
 """Triangles of a file for each polygon that a scene may have, before they are merged."""
 
 _MOST_WARNINGS: Final = 50
+_LONGEST_WARNING: Final = 900
 
 _Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 """Turns a scene whose y is up so that its z is."""
@@ -40,7 +41,7 @@ _Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0,
 
 @dataclass(frozen=True)
 class Imported:
-    """A scene out of a file, and what its reader could not keep."""
+    """A scene out of a file, and what its reader could not keep, which are the scene's notes too."""
 
     document: SceneDocument
     warnings: tuple[str, ...]
@@ -146,7 +147,8 @@ class SceneBuilder:
         told = [text if n == 1 else f"{text} ({n} times)" for text, n in self._warnings.items()]
         if len(told) > _MOST_WARNINGS:
             told[_MOST_WARNINGS:] = [f"and {len(told) - _MOST_WARNINGS} more"]
-        return Imported(document, tuple(text[0].upper() + text[1:] + "." for text in told))
+        notes = [text[0].upper() + text[1:_LONGEST_WARNING] + "." for text in told]
+        return Imported(document.model_copy(update={"notes": notes}) if notes else document, tuple(notes))
 
     def _overview(self, document: SceneDocument) -> CameraDocument:
         """A camera that sees the surfaces, but need not see lamps, which may be far away."""

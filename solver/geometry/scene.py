@@ -91,6 +91,8 @@ class Scene:
     name: str = ""
     luminous_efficacy: float = 179.0
     """Lumens per watt: photometric values are this times the luminance of the radiometric triple."""
+    notes: tuple[str, ...] = ()
+    """What a user should know of where the scene has come from."""
 
     def __iter__(self) -> Iterator[SceneObject]:
         return iter(self.objects.values())

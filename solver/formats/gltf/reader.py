@@ -15,7 +15,7 @@ from solver.errors import SceneError
 from solver.formats.building import Imported, SceneBuilder
 from solver.formats.gltf.container import Container
 from solver.formats.gltf.lights import add_light
-from solver.formats.gltf.models import Camera, Light, Node, Scene
+from solver.formats.gltf.models import Camera, Light, Node, Primitive, Scene
 from solver.formats.gltf.shapes import NGONS, polygons_of, positions, triangles_of
 from solver.formats.gltf.surfaces import Painted, Painter
 from solver.formats.painting import paint_groups
@@ -161,7 +161,7 @@ class _Reader:
         if primitive.targets:
             self._builder.warn("morph targets are left out")
         triangles = triangles_of(self._container, primitive, len(vertices), where)
-        if len(triangles) == 0:
+        if len(triangles) == 0 or self._is_back(primitive):
             return
         if not np.isfinite(vertices).all():
             raise SceneError("a place is not finite", (*where, "attributes", "POSITION"))
@@ -173,6 +173,14 @@ class _Reader:
         for members, mean in paint_groups(vertices, faces, values):
             chosen = faces if members is None else [faces[member] for member in members]
             yield _Piece(vertices, chosen, painted, mean)
+
+    def _is_back(self, primitive: Primitive) -> bool:
+        """Whether this project has written it as the other side of a surface that is there already."""
+        materials = self._file.materials
+        if primitive.material is None or primitive.material >= len(materials):
+            return False
+        extras = materials[primitive.material].extras
+        return isinstance(extras, dict) and extras.get("back") is True
 
     def _add_camera(self, name: str, camera: Camera, node: FloatArray) -> None:
         lens = camera.perspective

@@ -79,17 +79,20 @@ class SceneWriter:
         )
         return len(self._materials) - 1
 
-    def unlit(self, name: str, source: Material, extension: str) -> int:
-        """A material that is shown as the colours of vertices are."""
+    def unlit(self, name: str, source: Material, extension: str, is_back: bool = False) -> int:
+        """A material that is shown as the colours of vertices are, on one side.
+
+        What it is made of goes into `extras`; those of a back say that it is one, and it comes back with the
+        front.
+        """
         self._used.add(extension)
         self._materials.append(
             gltf.Material(
                 name=name,
                 alphaCutoff=None,
-                doubleSided=source.two_sided,
                 extensions={extension: {}},
                 pbrMetallicRoughness=gltf.PbrMetallicRoughness(metallicFactor=0.0, roughnessFactor=1.0),
-                extras=material_extras(source),
+                extras={"back": True} if is_back else material_extras(source),
             )
         )
         return len(self._materials) - 1

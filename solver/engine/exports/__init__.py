@@ -1,0 +1,1 @@
+"""Scenes and their solutions as files for other programs."""
