@@ -6,7 +6,6 @@ elsewhere. So there is one reference, and one mesh that shooting goes by and tha
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -15,6 +14,7 @@ from benchmarks.edit_cases import EDITS, Edit
 from benchmarks.edit_curves import Curve, follow_shooting, follow_solver
 from benchmarks.edit_error import EditWitness
 from benchmarks.edit_figures import plot_edits
+from benchmarks.edit_runs import Run, run_fastest
 from benchmarks.plan import Job, Options, Section
 from benchmarks.shooting import Shooting
 from benchmarks.solving import Solved, solve_once
@@ -51,9 +51,6 @@ SMALL_RATIO: Final = 20.0
 SHOOTING_SECONDS: Final = 60.0
 """CPU seconds that shooting may take"""
 
-_LONG: Final = 2.0
-"""Seconds after which a run is not repeated"""
-
 
 @dataclass(frozen=True)
 class Depth:
@@ -69,25 +66,6 @@ class Depth:
     """Runs of which the fastest is told, where they are short"""
     tolerance: float = SolverSettings().error_tolerance
     """Of the solutions"""
-
-
-@dataclass(frozen=True)
-class Run:
-    """A solve that nobody looked into."""
-
-    cpu: float
-    """Seconds of all threads, from the scene to the solution, ray hierarchy included"""
-    wall: float
-    begun: float
-    """Seconds of wall time until it could be stepped"""
-    longest_slice: float
-    """Seconds of wall time"""
-    looks: int
-    """Links looked at anew, where an edit has touched some"""
-    pairs: int
-    """Links shot over"""
-    links: int
-    rays: int
 
 
 @dataclass(frozen=True)
@@ -158,37 +136,6 @@ def measure_edits(edits: tuple[Edit, ...], depth: Depth) -> SceneEdits:
         )
 
     return SceneEdits(tuple(measure(edit) for edit in edits))
-
-
-def run_fastest(prepare: Callable[[], Callable[[], RadiositySolver]], times: int) -> Run:
-    """The run of least CPU time, of solvers that are made by what `prepare` returns, which does not count."""
-    runs = [_run(prepare())]
-    while len(runs) < times and runs[-1].cpu < _LONG:
-        runs.append(_run(prepare()))
-    return min(runs, key=lambda run: run.cpu)
-
-
-def _run(make: Callable[[], RadiositySolver]) -> Run:
-    cpu, start = time.process_time(), time.perf_counter()
-    solver = make()
-    begun = before = time.perf_counter()
-    longest, more = 0.0, True
-    while more:
-        more = solver.step(0.0)
-        now = time.perf_counter()
-        longest, before = max(longest, now - before), now
-    cpu = time.process_time() - cpu
-    statistics = solver.statistics()
-    return Run(
-        cpu=cpu,
-        wall=before - start,
-        begun=begun - start,
-        longest_slice=longest,
-        looks=solver.looks if isinstance(solver, Redistribution) else 0,
-        pairs=solver.shots,
-        links=statistics.links,
-        rays=statistics.rays,
-    )
 
 
 def _redistribution(base: Solved, after: Scene, settings: SolverSettings) -> Callable[[], Redistribution]:
