@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from solver.engine.instant.earlier import EarlierSights
 from solver.engine.world import World
 from solver.illumination.particles.clearance import clear_of_walls
 from solver.illumination.particles.compensation import emission_bounds
@@ -58,8 +59,14 @@ class LightBlock:
     """The lights of one block, in an order that has nothing to do with where they are, and their images."""
 
     def __init__(
-        self, paths: int, lights: ShiningLights, images: ShiningImages, emission_bound: FloatArray
+        self,
+        number: int,
+        paths: int,
+        lights: ShiningLights,
+        images: ShiningImages,
+        emission_bound: FloatArray,
     ) -> None:
+        self.number = number
         self.paths = paths
         self.emission_bound = emission_bound
         """(p,) local: what patches emit is not bounded by less"""
@@ -82,13 +89,19 @@ class LightBlock:
 class LightBlocks:
     """All blocks of one world, made as they are asked for."""
 
-    def __init__(self, world: World, resolution: int, seed: int = 0) -> None:
+    def __init__(
+        self, world: World, resolution: int, seed: int = 0, before: LightBlocks | None = None
+    ) -> None:
+        """None are made yet. What lights saw of an earlier world, by the blocks `before`, is seen again."""
         self.world = world
         self.polygons = Polygons.of(world.surfaces)
         self._walk = ParticleWalk(world.surfaces, world.rays)
         self._resolution = resolution
         self._seed = seed
         self._blocks: dict[int, LightBlock] = {}
+        self._before = (
+            None if before is None else EarlierSights(before.seen(), before.polygons, self.polygons)
+        )
         self._bytes = 0
         self.light_count = 0
         """Lights made so far"""
@@ -106,7 +119,7 @@ class LightBlocks:
             shining = ShiningLights.all_of(self.polygons, lights, least)
             images = mirror_images(lights, surfaces, len(lights), number)
             self._blocks[number] = LightBlock(
-                paths, shining, ShiningImages.of(self.polygons, shining, images, least), least
+                number, paths, shining, ShiningImages.of(self.polygons, shining, images, least), least
             )
             self.light_count += len(shining)
         return self._blocks[number]
@@ -143,14 +156,22 @@ class LightBlocks:
             images = folded.scaled(factor)
             add_light(light, receivers, images.lights, images.sights, bound, images.folds, gloss)
 
+    def seen(self) -> dict[int, list[tuple[ShiningLights, Sights]]]:
+        """What lights see, as far as it is kept, batch by batch for the blocks by their numbers."""
+        return {
+            number: [(block.batch(k), sights) for k, sights in enumerate(block.sights) if sights is not None]
+            for number, block in self._blocks.items()
+        }
+
     def _look(self, block: LightBlock, batch: int) -> tuple[Sights, FoldedLights | None]:
         """What the lights of a batch see, and their images."""
-        known = block.sights[batch]
-        if known is not None:
-            return known, block.folded[batch]
+        kept = block.sights[batch]
+        if kept is not None:
+            return kept, block.folded[batch]
         lights = block.batch(batch)
         rays, polygons = self.world.rays, self.polygons
-        sights = look_around(rays, polygons, lights.frames, self._resolution)
+        known = None if self._before is None else self._before.of(block.number, lights)
+        sights = look_around(rays, polygons, lights.frames, self._resolution, known)
         images = block.images.part(batch * BATCH, (batch + 1) * BATCH)
         folded = look_through(rays, polygons, lights, sights, images) if len(images) > 0 else None
         taken = sights.nbytes
@@ -160,4 +181,6 @@ class LightBlocks:
         if self._bytes + taken <= SIGHT_BYTES:
             self._bytes += taken
             block.sights[batch], block.folded[batch] = sights, folded
+        if self._before is not None and block.is_kept:
+            self._before.forget(block.number)
         return sights, folded

@@ -75,7 +75,7 @@ class InstantFrames:
         while len(self._before) > KEPT:
             self._before.pop(next(iter(self._before)))
         self._asked.clear()
-        self._begin(world)
+        self._begin(world, self._blocks)
 
     def ask(self, camera: Camera, samples: int, max_error: float, drawing: Drawing) -> AskedInstant:
         """The frame of `camera` as it stands. It is wanted from now on, with at most that error.
@@ -108,8 +108,8 @@ class InstantFrames:
                     return True
         return worked
 
-    def _begin(self, world: World) -> None:
-        self._blocks = LightBlocks(world, self._settings.vpl_resolution)
+    def _begin(self, world: World, before: LightBlocks | None = None) -> None:
+        self._blocks = LightBlocks(world, self._settings.vpl_resolution, before=before)
         self._mesh: RenderMesh | None = None
 
     def _points(self) -> int:

@@ -153,11 +153,11 @@ def _sights(
                 frames, image, pyramid, middle[image], table, np.float32(rays.offset),
                 is_through, through, origins, directions,
             )  # fmt: skip
-            hit = np.full(n, -1, dtype=np.int32)
+            seen = np.zeros(n, dtype=np.int32)
             for first in range(0, count, CHUNK):
                 part = slice(first, min(first + CHUNK, count))
-                hit[through[part]] = rays.first_local(origins[part], directions[part])
-            found[image] = palette[: number_polygons(hit, of_triangle, number, palette, texels[image])].copy()
+                seen[through[part]] = of_triangle[rays.first_local(origins[part], directions[part])]
+            found[image] = palette[: number_polygons(seen, number, palette, texels[image])].copy()
 
     run_chunks(trace, k, 8, 1)
     start = np.zeros(k + 1, dtype=np.int32)

@@ -23,7 +23,7 @@ from solver.illumination.particles.receivers import Polygons
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.tolerances import TOUCH
-from solver.types import Float32Array, IntArray
+from solver.types import Float32Array, Int64Array, IntArray
 from solver.visibility.rays import CHUNK, RayScene
 
 RESOLUTION: Final = 128
@@ -75,12 +75,30 @@ class Sights:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What some lights saw of a scene before it was edited, in maps of the same resolution."""
+
+    sights: Sights
+    row: IntArray
+    """(m,) map of each light in `sights`, -1 where there is none"""
+    renumbered: IntArray
+    """(q before + 1,) number that each polygon has now, -1 where it is no longer where it was"""
+    boxes: Float32Array
+    """(k, 2, 3) local: around what was not there before"""
+
+
 def look_around(
-    rays: RayScene, polygons: Polygons, frames: Float32Array, resolution: int = RESOLUTION
+    rays: RayScene,
+    polygons: Polygons,
+    frames: Float32Array,
+    resolution: int = RESOLUTION,
+    known: Known | None = None,
 ) -> Sights:
     """What lights see, in maps of `resolution` texels square.
 
-    `frames` (12, m) holds local positions, unit normals and the two tangents. Raises ValueError for a
+    `frames` (12, m) holds local positions, unit normals and the two tangents. Of lights that are `known` only
+    those texels are traced that saw what is gone, or look where something has come. Raises ValueError for a
     resolution that is not in 2 to `MOST_RESOLUTION`.
     """
     if not 2 <= resolution <= MOST_RESOLUTION:
@@ -94,15 +112,25 @@ def look_around(
     def trace(start: int, stop: int) -> None:
         origins = np.empty((n, 3), dtype=np.float32)
         directions = np.empty((n, 3), dtype=np.float32)
-        hit = np.empty(n, dtype=np.int32)
+        seen = np.empty(n, dtype=np.int32)
         number = np.zeros(len(polygons) + 1, dtype=np.int32)
         palette = np.empty(n + 1, dtype=np.int32)
         for light in range(start, stop):
             _aim(frames, light, table, np.float32(rays.offset), origins, directions)
-            for first in range(0, n, CHUNK):
-                part = slice(first, first + CHUNK)
-                hit[part] = rays.first_local(origins[part], directions[part])
-            found[light] = palette[: number_polygons(hit, of_triangle, number, palette, texels[light])].copy()
+            row = -1 if known is None else int(known.row[light])
+            if known is None or row < 0:
+                for first in range(0, n, CHUNK):
+                    part = slice(first, first + CHUNK)
+                    seen[part] = of_triangle[rays.first_local(origins[part], directions[part])]
+            else:
+                before = known.sights
+                changed = _recall(
+                    before.texels[row].reshape(-1), before.polygon[before.start[row] : before.start[row + 1]],
+                    known.renumbered, known.boxes, origins, directions, seen,
+                )  # fmt: skip
+                hit = rays.first_local(origins[changed], directions[changed])
+                seen[changed] = of_triangle[hit]
+            found[light] = palette[: number_polygons(seen, number, palette, texels[light])].copy()
 
     run_chunks(trace, m, 8, 1)
     start = np.zeros(m + 1, dtype=np.int32)
@@ -144,17 +172,55 @@ def _aim(
 
 
 @kernel
-def number_polygons(
-    hit: IntArray, of_triangle: IntArray, number: IntArray, palette: IntArray, texels: Texels
-) -> int:
-    """Number the polygons of the triangles `hit` (n,) as they come; how many there are, nothing included.
+def _recall(
+    texels: Texels,
+    palette: IntArray,
+    renumbered: IntArray,
+    boxes: Float32Array,
+    origins: Float32Array,
+    directions: Float32Array,
+    seen: IntArray,
+) -> Int64Array:
+    """What texels (n,) saw, by its present number, into `seen` (n,); returns those that must look again."""
+    again = np.empty(len(texels), dtype=np.int64)
+    count = 0
+    for k in range(len(texels)):
+        polygon = renumbered[palette[texels[k]]]
+        looks = polygon < 0
+        for box in range(len(boxes)):
+            if looks:
+                break
+            near = 0.0
+            far = np.inf
+            for axis in range(3):
+                along = directions[k, axis]
+                low = boxes[box, 0, axis] - origins[k, axis]
+                high = boxes[box, 1, axis] - origins[k, axis]
+                if along == 0.0:
+                    if low > 0.0 or high < 0.0:
+                        far = -1.0
+                    continue
+                near = max(near, min(low / along, high / along))
+                far = min(far, max(low / along, high / along))
+            looks = near <= far
+        if looks:
+            again[count] = k
+            count += 1
+        else:
+            seen[k] = polygon
+    return again[:count]
 
-    `number` (q + 1,) is 0, and is left so. The last of `of_triangle` (t + 1,) stands for no triangle.
+
+@kernel
+def number_polygons(seen: IntArray, number: IntArray, palette: IntArray, texels: Texels) -> int:
+    """Number the polygons `seen` (n,) as they come; how many there are, nothing included.
+
+    `number` (q + 1,) is 0, and is left so.
     """
     palette[0] = 0
     count = 1
-    for k in range(len(hit)):
-        polygon = of_triangle[hit[k]]
+    for k in range(len(seen)):
+        polygon = seen[k]
         if polygon != 0 and number[polygon] == 0:
             number[polygon] = count
             palette[count] = polygon
