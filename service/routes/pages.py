@@ -1,12 +1,13 @@
-"""What is not part of a session: health, metrics, and the page that shows a scene at once."""
+"""What is not part of a session: health, metrics, and the viewer."""
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from pathlib import PurePosixPath
 from typing import Final
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, HTTPException, Response
 
 from service.context import Ctx, require_token
 from service.openapi import version
@@ -23,6 +24,12 @@ _HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
+}
+_TYPES: Final = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
 }
 
 
@@ -45,26 +52,27 @@ async def metrics(context: Ctx) -> Response:
 
 @router.get("/", include_in_schema=False)
 async def front_page() -> Response:
-    """A page that shows a scene that ships with the service, its frame and its progress."""
-    return _file("index.html", "text/html; charset=utf-8")
+    """The viewer."""
+    return _file("index.html")
 
 
-@router.get("/page/page.css", include_in_schema=False)
-async def style() -> Response:
-    """The page's style."""
-    return _file("page.css", "text/css; charset=utf-8")
+@router.get("/page/{name}", include_in_schema=False)
+async def part(name: str) -> Response:
+    """A style, a script or a picture of the viewer."""
+    return _file(name)
 
 
-@router.get("/page/page.js", include_in_schema=False)
-async def script() -> Response:
-    """The page's script."""
-    return _file("page.js", "text/javascript; charset=utf-8")
-
-
-def _file(name: str, media_type: str) -> Response:
-    return Response(_content(name), media_type=media_type, headers=_HEADERS)
+def _file(name: str) -> Response:
+    found = _contents().get(name)
+    if found is None:
+        raise HTTPException(404)
+    return Response(found, media_type=_TYPES[PurePosixPath(name).suffix], headers=_HEADERS)
 
 
 @cache
-def _content(name: str) -> bytes:
-    return resources.files("service").joinpath("page", name).read_bytes()
+def _contents() -> dict[str, bytes]:
+    """The viewer's files by their names."""
+    folder = resources.files("service").joinpath("page")
+    return {
+        file.name: file.read_bytes() for file in folder.iterdir() if PurePosixPath(file.name).suffix in _TYPES
+    }

@@ -78,8 +78,8 @@ class _Sent:
     number: int
     at: float
     quality: Quality
-    took: float
-    """Seconds in the worker"""
+    drawn_in: float
+    """Seconds"""
 
 
 class Feed:
@@ -114,7 +114,8 @@ class Feed:
             sent = self._unacknowledged.popleft()
             self._metrics.stream_round_trips.observe(now - sent.at)
             if sent.quality is Quality.MOVING:
-                self._pace.took(max(sent.took, now - sent.at))
+                # What it waited for the solver's step to end would be no less for a coarser frame.
+                self._pace.took(sent.drawn_in + now - sent.at)
         self._stir.set()
 
     async def run(self) -> None:
@@ -182,7 +183,7 @@ class Feed:
         camera = self._camera
         if camera is None:
             return
-        revision, standing, start = self._revision, self._standing(), time.monotonic()
+        revision, standing = self._revision, self._standing()
         try:
             answer = await self._fetch(self._request(camera, ask), ask, revision)
         except RefusedError as error:
@@ -201,7 +202,7 @@ class Feed:
         is_worth = answer.outlook.drawable or answer.outlook.renderer not in _NOT_YET
         self._shown = _Shown(ask.view, ask.quality, answer, is_worth, standing)
         if answer.content is not None and is_worth:
-            await self._send(camera, ask, answer, answer.content, time.monotonic() - start)
+            await self._send(camera, ask, answer, answer.content)
 
     def _request(self, camera: CameraMessage, ask: _Ask) -> GetFrame:
         frame = camera.frame
@@ -235,11 +236,9 @@ class Feed:
             if not fetching.cancelled():
                 fetching.exception()  # whoever is left to hear of it, it is not the log
 
-    async def _send(
-        self, camera: CameraMessage, ask: _Ask, answer: FrameAnswer, content: bytes, took: float
-    ) -> None:
+    async def _send(self, camera: CameraMessage, ask: _Ask, answer: FrameAnswer, content: bytes) -> None:
         self._number += 1
-        self._unacknowledged.append(_Sent(self._number, time.monotonic(), ask.quality, took))
+        self._unacknowledged.append(_Sent(self._number, time.monotonic(), ask.quality, answer.seconds))
         header = FrameHeader(
             number=self._number,
             id=camera.id,

@@ -15,10 +15,10 @@ from typing import Final
 STILL: Final = 0.15
 """Seconds without another camera after which a view rests"""
 
-_TOO_SLOW: Final = 0.066
+_TOO_SLOW: Final = 0.06
 """Seconds; frames that take longer are made coarser"""
 
-_QUICK: Final = 0.025
+_QUICK: Final = 0.024
 """Seconds; frames that take less may be finer. The next step has at most 2.3 times the pixels."""
 
 
@@ -77,7 +77,7 @@ class Pace:
         return LADDER[self._step]
 
     def took(self, seconds: float) -> None:
-        """A frame of a moving view took so long to be made and to arrive."""
+        """A frame of a moving view took so long to be drawn and to arrive."""
         if seconds > _TOO_SLOW:
             self._step = min(self._step + 1, len(LADDER) - 1)
         elif seconds < _QUICK:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -93,16 +94,37 @@ def test_the_page_holds_together(client: TestClient) -> None:
     policy = page.headers["content-security-policy"]
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
-    script = client.get("/page/page.js")
-    assert script.headers["content-type"].startswith("text/javascript")
     assert client.get("/page/page.css").headers["content-type"].startswith("text/css")
-    # What the page needs is served here, nothing of it is inline, and the script finds its elements.
+    # What the page needs is served here, nothing of it is inline, and the scripts find its elements.
     assert set(re.findall(r'(?:src|href)="(/[^"]*)"', page.text)) == {
         "/page/page.css",
-        "/page/page.js",
+        "/page/main.js",
+        "/page/icon.svg",
         "/docs",
     }
     assert not re.search(r"<style|<script[^>]*>[^<]|\sstyle=|\son\w+=", page.text)
-    wanted = set(re.findall(r'(?:element|show)\("([\w-]+)"', script.text))
-    assert len(wanted) > 5
-    assert wanted <= set(re.findall(r'\bid="([\w-]+)"', page.text))
+    scripts = scripts_from(client, "main.js")
+    assert {"stream.js", "gizmo.js", "overlays.js"} <= set(scripts)
+    ids = set(re.findall(r'\bid="([\w-]+)"', page.text))
+    for script in scripts.values():
+        assert set(re.findall(r'\bfind\("([\w-]+)"\)', script)) <= ids
+        assert not re.search(r"https?://(?!www\.w3\.org/)|\beval\(|innerHTML", script)
+
+
+def scripts_from(client: TestClient, first: str) -> dict[str, str]:
+    """A script and all that it imports, by their names."""
+    found: dict[str, str] = {}
+    wanted = [first]
+    while wanted:
+        name = wanted.pop()
+        if name not in found:
+            answer = client.get(f"/page/{name}")
+            assert answer.headers["content-type"].startswith("text/javascript"), name
+            found[name] = answer.text
+            wanted += re.findall(r'from "\./([\w-]+\.js)"', answer.text)
+    return found
+
+
+@pytest.mark.parametrize("name", ["none.js", "..%2fapp.py", "%2e%2e", "page.css%00", "__init__.py"])
+def test_nothing_but_the_page_is_served(client: TestClient, name: str) -> None:
+    assert client.get(f"/page/{name}").status_code == 404
