@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -44,14 +44,27 @@ from solver.visibility.rays import RayScene
 _PROGRESS: Final = 0.5
 """Part of the progress that redistribution makes."""
 
+_ROUGHLY: Final = 0.1
+"""Share of what redistribution has left unshot that may be unshot when refinement begins."""
+
+_FIRST_NOISE: Final = 64.0
+"""Noise that links of new pairs may have at first, of the error that is refined: the strongest ones first get
+some light, and more rays when they are refined."""
+
+_CLOSER: Final = 0.5
+"""Error that what is new may have, of what links had that were there: it is what everybody looks at."""
+
 _THRESHOLD: Final = 0.05
 """Share of the energy below which redistribution does not come first any more."""
 
 _SHOTS_A_GATHER: Final = 0.02
 """Links that are looked at between two propagations, of all."""
 
+_GROWN: Final = 1.02
+"""Growth of the number of links at which those are tried for mergers that something has ceased to block."""
+
 _CREEP: Final = 1.15
-"""Growth of the number of links at which all of them are looked at for mergers."""
+"""The same for all links."""
 
 _FOLDED: Final = 0.03
 """Elements without links are folded back when they are more than this share of all."""
@@ -179,6 +192,7 @@ class Redistribution(RadiositySolver):
         state = self._state
         moments = moments_of(state)
         self._arrived = np.zeros_like(state.received)
+        coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         # What has been shot is as uncertain as what has not, until it is propagated.
         self.error_estimate = min(1.0, math.hypot(self._known_error, plan.doubt))
         changed, faded = [], []
@@ -191,7 +205,7 @@ class Redistribution(RadiositySolver):
             changed.append(self._look_again(seen, plan.light, moments))
             faded.append(np.intersect1d(changed[-1], left, assume_unique=True))
             paired = int((plan.rows[part] < 0).sum())
-            self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], plan.light, moments)
+            self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], coarse, moments)
             self._unlinked = self._unlinked.without(paired)
             self._paid = part.stop
             self.looks += part.stop - part.start
@@ -210,6 +224,15 @@ class Redistribution(RadiositySolver):
         unshot, scale = unshot_square(state)
         new = math.sqrt(unshot / scale) if scale > 0.0 else 1.0
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
+        if new > self.settings.error_tolerance and plan.left[0] > 0.0:
+            # So much has changed that refinement would look at the wrong light.
+            yield from self._settle(_ROUGHLY * new)
+            self.version += 1
+            yield True
+        else:
+            patch = state.tree.patch
+            state.radiosity = state.reflectance[patch][:, None] * state.received
+            state.radiosity[:, 0] += state.emission[patch]
         self._faded = np.concatenate([self._faded, *faded])
         self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
         yield from self._refine_as_before()
@@ -246,13 +269,12 @@ class Redistribution(RadiositySolver):
         state = self._state
         if self.bound <= 0.0 or len(self._new) == 0:
             return
-        patch = state.tree.patch
-        state.radiosity = state.reflectance[patch][:, None] * state.received
-        state.radiosity[:, 0] += state.emission[patch]
         residuals = Residuals.of(state)
         yield True
         full = len(state.links) > _CREEP * self.lean
         rows, merging = self._new, self._faded
+        if len(state.links) <= _GROWN * self.lean:
+            merging = merging[:0]
         if full:
             rows = merging = np.arange(len(state.links), dtype=np.int32)
         work = coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound)
@@ -267,7 +289,7 @@ class Redistribution(RadiositySolver):
             self.lean = len(state.links)
         while True:
             estimate = residuals.estimate(state, state.links.take(rows))
-            choice = choose_above(state, rows, estimate, self.settings, self.bound)
+            choice = choose_above(state, rows, estimate, self.settings, _CLOSER * self.bound)
             yield True
             if not isinstance(choice, Choice):
                 break

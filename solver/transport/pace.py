@@ -25,6 +25,18 @@ class Pace:
 
     def __init__(self) -> None:
         self._cost = _FIRST
+        self._away = 0.0
+        self._left: float | None = None
+
+    def pause(self) -> None:
+        """The work rests: the time until it goes on is no batch's."""
+        self._left = time.perf_counter()
+
+    def resume(self) -> None:
+        """The work goes on."""
+        if self._left is not None:
+            self._away += time.perf_counter() - self._left
+            self._left = None
 
     def batches(self, costs: Int64Array) -> Iterator[slice]:
         """Slices of a range of items with `costs` (n,) relative to each other, in order."""
@@ -33,9 +45,9 @@ class Pace:
         while first < len(costs):
             done = int(ends[first - 1]) if first else 0
             last = max(first + 1, int(np.searchsorted(ends, done + self._cost, side="right")))
-            start = time.perf_counter()
+            start = time.perf_counter() - self._away
             yield slice(first, last)
-            seconds = time.perf_counter() - start
+            seconds = time.perf_counter() - self._away - start
             rate = (int(ends[last - 1]) - done) / max(seconds, 1e-6)
             self._cost = min(_MOST, max(_LEAST, min(4.0 * self._cost, SLICE * rate)))
             first = last

@@ -210,6 +210,14 @@ class RadiositySolver(SlicedSolve):
     def _to_rgb(self, spectra: Spectra) -> Spectra:
         return np.repeat(spectra, 3, axis=1) if self._state.channels == 1 else spectra.copy()
 
+    def step(self, budget: float) -> bool:
+        """Work for about `budget` seconds; True while more remains."""
+        self.pace.resume()
+        try:
+            return super().step(budget)
+        finally:
+            self.pace.pause()
+
     # --- the work, in slices -------------------------------------------------------------------------
 
     def _open(self) -> Iterator[bool]:
