@@ -17,7 +17,20 @@ from service.hosting.sessions import Sessions
 from service.json_body import BodyLimit
 from service.metrics import Metrics, RequestMetrics
 from service.openapi import describe, version
-from service.routes import edits, events, frames, lightmaps, overlays, pages, picks, probe, scenes, stream
+from service.routes import (
+    edits,
+    events,
+    exports,
+    files,
+    frames,
+    lightmaps,
+    overlays,
+    pages,
+    picks,
+    probe,
+    scenes,
+    stream,
+)
 from service.routes import sessions as session_routes
 
 
@@ -42,7 +55,10 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
     app.state.context = Context(chosen, pool, sessions, metrics)
     problems.install(app)
     app.include_router(pages.router)
-    for routes in (scenes, session_routes, edits, frames, probe, picks, overlays, lightmaps, events, stream):
+    for routes in (
+        scenes, files, session_routes, edits, frames, probe, picks, overlays, lightmaps, exports, events,
+        stream,
+    ):  # fmt: skip
         app.include_router(routes.router, dependencies=[Depends(require_token)])
     app.include_router(stream.sockets)
     describe(app)

@@ -16,7 +16,7 @@ _NUMBER: Final = r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?"
 _Triple: TypeAlias = tuple[float, float, float]
 
 
-def _triple(text: str) -> _Triple:
+def triple_of(text: str) -> _Triple:
     """The numbers of a text like 1,2,3. Raises PydanticCustomError."""
     try:
         x, y, z = (float(part) for part in text.split(","))
@@ -28,12 +28,12 @@ def _triple(text: str) -> _Triple:
 
 
 def _point(text: str) -> str:
-    _triple(text)
+    triple_of(text)
     return text
 
 
 def _direction(text: str) -> str:
-    if max(map(abs, _triple(text))) < LEAST_LENGTH:
+    if max(map(abs, triple_of(text))) < LEAST_LENGTH:
         raise PydanticCustomError("zero_vector", "a direction of length 0 points nowhere")
     return text
 
@@ -76,9 +76,9 @@ class CameraQuery(BaseModel):
         """The camera."""
         return CameraChoice(
             name=self.camera,
-            eye=None if self.eye is None else _triple(self.eye),
-            target=None if self.target is None else _triple(self.target),
-            up=None if self.up is None else _triple(self.up),
+            eye=None if self.eye is None else triple_of(self.eye),
+            target=None if self.target is None else triple_of(self.target),
+            up=None if self.up is None else triple_of(self.up),
             vertical_fov=self.vertical_fov,
             width=self.width,
             height=self.height,

@@ -106,12 +106,16 @@ class JsonRoute(APIRoute):
         handle = super().get_route_handler()
 
         async def handle_json(request: Request) -> Response:
-            parsed = JsonRequest(request.scope, request.receive)
-            if self.body_field is not None and await parsed.body():
-                _require_json(request.headers.get("content-type", ""))
-            return await handle(parsed)
+            return await handle(await self.parsed(request))
 
         return handle_json
+
+    async def parsed(self, request: Request) -> Request:
+        """The request as FastAPI is to see it. Raises ProblemError."""
+        parsed = JsonRequest(request.scope, request.receive)
+        if self.body_field is not None and await parsed.body():
+            _require_json(request.headers.get("content-type", ""))
+        return parsed
 
 
 def _require_json(content_type: str) -> None:

@@ -15,6 +15,8 @@ from solver.document.edits import Edit
 from solver.document.fields import Location
 from solver.document.limits import SceneLimits
 from solver.document.settings import SettingsDocument
+from solver.engine.exports.files import Export, ExportRequest
+from solver.engine.grids import GridRequest
 from solver.engine.lightmaps.bake import LightmapRequest
 from solver.engine.lightmaps.files import LightmapFormat
 from solver.engine.overlays.base import OverlayRequest
@@ -195,6 +197,28 @@ class GetLightmap(Request[LightmapAnswer]):
     """W/m2; None: as suits"""
     complete: bool
     """Wait until all is done that is to be done"""
+    timeout: float
+    """Seconds"""
+
+
+@dataclass(frozen=True)
+class GetExport(Request[Export]):
+    """The session as a file, once its light is good enough or time is up."""
+
+    export: ExportRequest
+    complete: bool
+    """Wait until the solution rests"""
+    timeout: float
+    """Seconds"""
+
+
+@dataclass(frozen=True)
+class GetGrid(Request[Export]):
+    """Light measured over a grid of points, as a table."""
+
+    grid: GridRequest
+    complete: bool
+    """Wait until the solution rests"""
     timeout: float
     """Seconds"""
 

@@ -8,17 +8,22 @@ from typing import Protocol
 from service.hosting.answers import answer_frame, drawn
 from service.hosting.messages import (
     FrameAnswer,
+    GetExport,
     GetFrame,
+    GetGrid,
     GetLightmap,
     GetOverlay,
     LightmapAnswer,
     OverlayAnswer,
 )
 from solver.engine.engine import Engine
+from solver.engine.exports.files import Export
+from solver.engine.grids import csv_of
 from solver.engine.lightmaps.bake import Bake
 from solver.engine.lightmaps.files import encode_lightmap, white_of
 from solver.engine.overlays.base import Needs, NotReadyError, Work, still_missing
 from solver.engine.overlays.files import encode_overlay
+from solver.engine.status import SessionState
 
 
 class Waiting(Protocol):
@@ -94,6 +99,35 @@ class WaitingOverlay:
         if not engine.is_overlay_ready(asked, complete=False):
             raise still_missing(asked.overlay.needs)
         return True
+
+
+class WaitingExport:
+    """An export, or a grid, that waits for the light."""
+
+    is_working = False
+
+    def __init__(self, request: GetExport | GetGrid) -> None:
+        self._request = request
+        self.deadline = time.monotonic() + request.timeout
+
+    def poll(self, engine: Engine) -> Export | None:
+        """The file, when the solution rests if it is to, or time is up; making one takes what it takes.
+
+        Raises SceneError, LimitExceededError.
+        """
+        status = engine.status()
+        rests = status.state is not SessionState.SOLVING
+        if self._request.complete and not rests and time.monotonic() < self.deadline:
+            return None
+        if isinstance(self._request, GetExport):
+            return engine.export(self._request.export)
+        grid, result = engine.measure(self._request.grid)
+        return Export(
+            content=csv_of(grid, result),
+            revision=result.revision,
+            error_estimate=status.error_estimate,
+            converged=status.state is SessionState.CONVERGED,
+        )
 
 
 class WaitingLightmap:

@@ -22,7 +22,9 @@ from service.hosting.messages import (
     Answer,
     AnyRequest,
     Call,
+    GetExport,
     GetFrame,
+    GetGrid,
     GetLightmap,
     GetOverlay,
     Open,
@@ -30,7 +32,7 @@ from service.hosting.messages import (
     StatusChanged,
     ToWorker,
 )
-from service.hosting.waiting import Waiting, WaitingFrame, WaitingLightmap, WaitingOverlay
+from service.hosting.waiting import Waiting, WaitingExport, WaitingFrame, WaitingLightmap, WaitingOverlay
 from service.hosting.wire import WorkerEnd
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
@@ -100,6 +102,8 @@ class Host:
                 self._waiting[number] = WaitingOverlay(request, SLICE)
             case Call(number, GetLightmap() as request):
                 self._waiting[number] = WaitingLightmap(request, SLICE)
+            case Call(number, (GetExport() | GetGrid()) as request):
+                self._waiting[number] = WaitingExport(request)
             case Call(number, request):
                 value = self._answer(request)
                 self._report()

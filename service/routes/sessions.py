@@ -7,6 +7,8 @@ import asyncio
 from fastapi import APIRouter, Request, Response
 
 from service.context import Ctx, UsedSession
+from service.file_body import FileRoute
+from service.file_query import described
 from service.hosting.messages import Configure, GetScene, GetStatus, Open
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
@@ -20,13 +22,20 @@ from solver.errors import SceneError
 from solver.geometry.scene import Scene
 
 router = APIRouter(prefix="/v1", tags=["sessions"], route_class=JsonRoute)
+_opening = APIRouter(route_class=FileRoute)
 
 
-@router.post("/sessions", status_code=201, responses=responses(413, 422, 429, 503))
+@_opening.post(
+    "/sessions", status_code=201, openapi_extra=described(), responses=responses(413, 422, 429, 503)
+)
 async def open_session(
     body: SessionRequest, request: Request, response: Response, context: Ctx
 ) -> SessionStatus:
-    """Open a session on a scene. The solve starts at once."""
+    """Open a session on a scene. The solve starts at once.
+
+    The scene may come as JSON, or as a file of another format, with its content type; what its reader could
+    not keep is among the session's warnings.
+    """
     limits = context.settings
     settings = body.settings.changes_to(limits.solver_defaults)
     limits.check_solver(settings)
@@ -36,6 +45,9 @@ async def open_session(
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
     return SessionStatus.of(session.id, status)
+
+
+router.include_router(_opening)
 
 
 def _scene(body: SessionRequest, limits: SceneLimits) -> Scene:

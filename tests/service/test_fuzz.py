@@ -23,6 +23,7 @@ SCHEMA: Final = schemathesis.openapi.from_dict(DESCRIPTION)
 
 OPERATIONS: Final = [
     ("POST", "/v1/sessions"),
+    ("POST", "/v1/convert"),
     ("GET", "/v1/sessions/{id}"),
     ("DELETE", "/v1/sessions/{id}"),
     ("PATCH", "/v1/sessions/{id}/settings"),
@@ -31,6 +32,8 @@ OPERATIONS: Final = [
     ("POST", "/v1/sessions/{id}/probe"),
     ("GET", "/v1/sessions/{id}/pick"),
     ("GET", "/v1/sessions/{id}/lightmap"),
+    ("GET", "/v1/sessions/{id}/export"),
+    ("GET", "/v1/sessions/{id}/grid"),
     *(
         ("GET", f"/v1/sessions/{{id}}/overlays/{name}")
         for name in (
