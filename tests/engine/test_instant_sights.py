@@ -49,7 +49,7 @@ def test_maps_are_those_of_lights_that_look_around_anew(
     world, rays = World.of(after), 0
     ask = RayScene.first_local
 
-    def counted(self: RayScene, origins: np.ndarray, *others: object) -> object:  # type: ignore[type-arg]
+    def counted(self: RayScene, origins: np.ndarray, *others: object) -> object:
         nonlocal rays
         rays += len(origins)
         return ask(self, origins, *others)  # type: ignore[arg-type]
