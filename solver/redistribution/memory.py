@@ -19,8 +19,11 @@ from solver.transport.solve import RadiositySolver
 from solver.transport.state import TransportState
 from solver.visibility.rays import RayScene
 
-BYTES: Final = 256 << 20
-"""Most that the remembered solutions of a session hold."""
+BYTES: Final = 384 << 20
+"""Most that the remembered solutions of a session hold: two of a large scene, before and after an edit."""
+
+COUNT: Final = 8
+"""Solutions that are remembered at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class Memory:
         if solver.outcome is not SolveOutcome.CONVERGED or state.nbytes > self._most:
             return
         links = yield from state.links.copy_in_steps()
-        while self._kept and self.nbytes + state.nbytes > self._most:
+        while self._kept and (self.nbytes + state.nbytes > self._most or len(self._kept) >= COUNT):
             self._kept.popitem(last=False)
         self._kept[key] = _Kept(solver, replace(state, links=links))
 

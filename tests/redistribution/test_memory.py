@@ -11,7 +11,7 @@ from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.status import SessionState
 from solver.illumination.settings import LightSettings
-from solver.redistribution.memory import Memory
+from solver.redistribution.memory import COUNT, Memory
 from solver.transport.settings import SolverSettings
 from tests.engine.acting import edits, settle
 from tests.redistribution.rooms import crate, fresh, room, settled
@@ -99,3 +99,10 @@ def test_what_is_not_settled_or_too_large_is_not_kept() -> None:
     for _ in memory.remember(fresh(room())):
         pass
     assert memory.nbytes == 0
+
+
+def test_only_so_many_are_kept() -> None:
+    by = SolverSettings(error_tolerance=0.2)
+    memory = Memory()
+    remembered(memory, *((room(0.1 + 0.05 * k), by) for k in range(COUNT + 2)))
+    assert len(memory._kept) == COUNT
