@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from halflight.console import ExitCode, fail, progress_bar, warn
-from halflight.render import load
+from halflight.loading import load
 
 if TYPE_CHECKING:
     from solver.engine.engine import Engine

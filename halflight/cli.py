@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from halflight import bake, info, render, serve, warm
+from halflight import bake, convert, info, render, serve, warm
 from halflight.console import project_version
 
 app = typer.Typer(
@@ -25,6 +25,7 @@ app.command("serve")(serve.serve)
 app.command("warm")(warm.warm)
 app.command("render")(render.render)
 app.command("bake")(bake.bake)
+app.command("convert")(convert.convert)
 app.command("info")(info.info)
 
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from halflight.console import ExitCode, fail, progress_bar, warn
+from halflight.loading import load
 
 if TYPE_CHECKING:
     from halflight.pictures import Picture
     from solver.engine.requests import CameraChoice
-    from solver.geometry.scene import Scene
 
 _SLICE: Final = 0.05
 """Seconds of work between two looks at the progress."""
@@ -164,25 +164,6 @@ def render(
     )
     if not picture.converged:
         raise typer.Exit(ExitCode.NOT_REACHED)
-
-
-def load(name: str) -> Scene:
-    """The scene of a file, or the sample of that name. Fails where there is no good one."""
-    from solver.document.samples import load_sample, load_scene, sample_names
-    from solver.errors import SceneError
-
-    path = Path(name)
-    if not path.exists() and name in sample_names():
-        return load_sample(name)
-    try:
-        return load_scene(path)
-    except FileNotFoundError:
-        samples = ", ".join(sample_names())
-        fail(f"{name}: no such file, nor a sample scene; those are {samples}", ExitCode.BAD_INPUT)
-    except OSError as refused:
-        fail(f"{name}: {(refused.strerror or str(refused)).lower()}", ExitCode.BAD_INPUT)
-    except SceneError as refused:
-        fail(f"{name}: {refused}", ExitCode.BAD_INPUT)
 
 
 def _camera_choice(
