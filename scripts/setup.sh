@@ -9,6 +9,9 @@ readonly STAMPS=$VENV/halflight-setup
 readonly PYTHON_PACKAGES=(python3 python3-venv)
 # libgl1 and libegl1 are the fronts; libegl-mesa0 and libgl1-mesa-dri the driver, with software GL.
 readonly EGL_PACKAGES=(libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri)
+# The viewer is tested in a real browser.
+readonly BROWSER_PACKAGES=(chromium fonts-dejavu-core)
+readonly BROWSERS=(chromium chromium-browser google-chrome)
 
 usage() {
     cat <<'TEXT'
@@ -25,7 +28,8 @@ Prepares this checkout to run halflight. Idempotent: what is in place is left al
 Options:
   --system-only   the system part alone
   --python-only   the python part alone
-  --dev           the python part with the packages that tests and checks need (requirements/dev.lock)
+  --dev           with what tests and checks need: the system part with Chromium, the python part with
+                  the packages of requirements/dev.lock
   --dry-run       show what would be done, check that the files it needs are there, and change nothing
   -h, --help      this text
 
@@ -91,6 +95,9 @@ set_up_system() {
         install_packages "no OpenGL through EGL ($reason)" "${EGL_PACKAGES[@]}"
         [[ $dry_run == yes ]] && return
         reason=$("$python" scripts/egl_probe.py) || fail "EGL does not work even with ${EGL_PACKAGES[*]}: $reason"
+    fi
+    if [[ $dev == yes ]] && ! command -v "${BROWSERS[@]}" >/dev/null; then
+        install_packages "no Chromium to test the viewer in" "${BROWSER_PACKAGES[@]}"
     fi
 }
 

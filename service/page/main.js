@@ -140,7 +140,8 @@ view.addEventListener("frame", ({ detail: header }) => {
   Object.assign(page.dataset, {
     frame: header.number, quality: header.quality, converged: header.converged, shown: header.revision,
   });
-  const how = header.quality === "moving" ? "moving" : header.converged ? "converged" : `error ${percent(header.error_estimate)}`;
+  const atRest = header.converged ? "converged" : `error ${percent(header.error_estimate)}`;
+  const how = header.quality === "moving" ? "moving" : atRest;
   find("caption").textContent = `${header.renderer}, ${header.width} × ${header.height}, ${how}`;
   showLegend(find("legend"), header.scale_maximum);
   const now = performance.now();

@@ -29,7 +29,8 @@ export async function openFile(file) {
   const type = MEDIA_TYPES[ending];
   if (!type) throw new Problem(415, { detail: `${file.name}: files that end in ${ACCEPTED} are read` });
   const name = file.name.slice(0, 200);
-  const response = await call(`${ENDPOINT}?${new URLSearchParams({ name })}`, { method: "POST", headers: { "Content-Type": type }, body: file });
+  const options = { method: "POST", headers: { "Content-Type": type }, body: file };
+  const response = await call(`${ENDPOINT}?${new URLSearchParams({ name })}`, options);
   const answer = await response.json().catch(() => ({}));
   if (!response.ok) throw new Problem(response.status, answer);
   return answer;

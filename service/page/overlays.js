@@ -1,18 +1,19 @@
 // What the session holds besides its light, drawn over the picture: fetched while the camera rests.
 
 import { get, Problem } from "./api.js";
+import { elementFigures } from "./elements.js";
 import { readOverlay } from "./glb.js";
 import { Depth, paintFigures } from "./painting.js";
 
 const PAUSE = 700; // milliseconds between two looks
 const LONGEST = 60000; // milliseconds that an overlay is waited for
 
-const place = ({ picked }) => picked && { x: picked.point[0], y: picked.point[1], z: picked.point[2], patch: picked.patch };
+const place = ({ picked: { point: [x, y, z], patch } }) => ({ x, y, z, patch });
 const ofElement = ({ picked }) => (picked ? { element: picked.element } : {});
 
 /** Overlays: their path, what they are called, and their query; null where a click on the picture is needed. */
 const OVERLAYS = [
-  { name: "mesh", label: "Elements", query: () => ({ limit: 20000 }) },
+  { name: "mesh", label: "Elements", query: () => ({ limit: 10000 }) },
   { name: "links", label: "Links (of the clicked element)", query: (now) => ({ limit: 3000, ...ofElement(now) }) },
   { name: "discontinuities", label: "Discontinuities", query: ({ camera }) => ({ ...camera.query, active: "true" }) },
   { name: "triangulation", label: "Triangulation", query: ({ camera }) => camera.query },
@@ -161,10 +162,13 @@ export class Overlays extends EventTarget {
 
   async #fetch(session, name, overlay, query) {
     try {
-      const all = { ...query, format: "glb", timeout_ms: LONGEST };
+      // Colours are finer, and outlines are those of elements, in the table.
+      const isTable = name === "mesh";
+      const all = { ...query, format: isTable ? "json" : "glb", timeout_ms: LONGEST };
       const { signal } = this.#waiting;
       const answer = await get(`/v1/sessions/${session.id}/overlays/${name}`, all, { signal });
-      Object.assign(overlay, readOverlay(await answer.arrayBuffer()), { problem: null });
+      const read = isTable ? elementFigures(await answer.json()) : readOverlay(await answer.arrayBuffer());
+      Object.assign(overlay, read, { problem: null });
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       Object.assign(overlay, { figures: [], facts: null, problem: error.message });

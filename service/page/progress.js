@@ -6,7 +6,9 @@ const HEIGHT = 90;
 const KEPT = 600; // points of the curve
 const SHOWN = 40; // newest entries of the log
 
-export const percent = (fraction) => (Number.isFinite(fraction) ? `${Number((100 * fraction).toPrecision(2))} %` : "unknown");
+export function percent(fraction) {
+  return Number.isFinite(fraction) ? `${Number((100 * fraction).toPrecision(2))}\u00a0%` : "unknown";
+}
 
 const STATES = {
   solving: (tolerance) => `Solving to ${tolerance}`,
