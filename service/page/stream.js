@@ -7,6 +7,7 @@ import { Problem, statusOf, token } from "./api.js";
 
 const FIRST_WAIT = 0.5; // seconds, doubled at each failure
 const LONGEST_WAIT = 8;
+const MOST_REFUSALS = 4; // of a session whose worker is gone, which may yet be given another
 const HEARTBEAT = 25; // seconds; the service ends streams that are silent for long
 
 const encoded = (text) => btoa(String.fromCharCode(...new TextEncoder().encode(text)))
@@ -16,6 +17,7 @@ export class Stream extends EventTarget {
   #session;
   #socket = null;
   #wait = FIRST_WAIT;
+  #refusals = 0;
   #timer = 0;
   #closed = false;
   #header = null;
@@ -81,6 +83,7 @@ export class Stream extends EventTarget {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.#wait = FIRST_WAIT;
+      this.#refusals = 0;
       this.#tell("open");
     };
     socket.onmessage = ({ data }) => this.#hear(data);
@@ -132,7 +135,8 @@ export class Stream extends EventTarget {
       await statusOf(this.#session);
     } catch (error) {
       if (this.#closed) return;
-      if (error instanceof Problem && [401, 403, 404, 503].includes(error.status)) {
+      this.#refusals = error.status === 503 ? this.#refusals + 1 : 0;
+      if ([401, 403, 404].includes(error.status) || this.#refusals >= MOST_REFUSALS) {
         this.#tell("gone", error);
       } else {
         this.#later();
