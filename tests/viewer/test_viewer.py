@@ -220,23 +220,39 @@ def test_keys_reach_everything(viewer: Viewer) -> None:
     expect(page.locator("#help")).to_be_hidden()
 
 
-def test_it_comes_back_when_the_service_does(browser: Browser) -> None:
+def test_a_session_that_is_gone_is_told_and_opened_anew(browser: Browser, service: Service) -> None:
+    with viewing(browser, f"{service.http.base_url}/", may_be_lost=True) as viewer:
+        viewer.open()
+        path, page = session_of(viewer), viewer.page
+        assert service.http.delete(path).status_code == 204
+        expect(page.locator("#problem")).to_contain_text("This session is gone")
+        viewer.keep("gone")
+        page.click("#restart")
+        expect(page.locator("#problem")).to_be_hidden()
+        viewer.await_state(connection="open")
+        viewer.settle()
+        assert session_of(viewer) != path
+
+
+def test_it_comes_back_when_the_service_does(browser: Browser, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = str(free.getsockname()[1])
-    address = f"http://127.0.0.1:{port}/"
-    with viewing(browser, address, may_be_lost=True) as viewer:
+    place = {"HALFLIGHT_PORT": port, "HALFLIGHT_DATA_DIR": str(tmp_path)}
+    with viewing(browser, f"http://127.0.0.1:{port}/", may_be_lost=True) as viewer:
         page = viewer.page
-        with running(HALFLIGHT_PORT=port):
+        with running(**place):
             viewer.open()
             viewer.settle()
         expect(page.locator("#banner")).to_contain_text("Trying again")
         viewer.keep("lost")
-        with running(HALFLIGHT_PORT=port):
-            page.wait_for_function("() => ['open', 'gone'].includes(viewer.dataset.connection)")
-            if viewer.state("connection") == "gone":
-                expect(page.locator("#problem")).to_contain_text("This session is gone")
-                viewer.keep("gone")
+        viewer.await_state(connection="waiting")
+        with running(**place) as service:
+            path = session_of(viewer)
+            survived = service.http.get(path).status_code == 200
+            viewer.await_state(connection="open" if survived else "gone")
+            if not survived:
                 page.click("#restart")
             expect(page.locator("#banner")).to_be_hidden()
             viewer.await_state(connection="open")
             viewer.settle()
+            assert (session_of(viewer) == path) == survived
