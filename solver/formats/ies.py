@@ -26,7 +26,7 @@ _FEET: Final = 0.3048
 _POINT: Final = 0.05
 """Metres across the opening of a luminaire that is said to be a point."""
 _MOST_ANGLES: Final = 4096
-_HORIZONTALS: Final = (0.0, 90.0, 180.0, 360.0)
+_HORIZONTALS: Final = (0.0, 90.0, 180.0, 270.0, 360.0)
 """Last horizontal angles of type C: all around alike, by quadrants, by halves, or all told."""
 
 
@@ -136,7 +136,8 @@ def read_photometry(source: SourceFile) -> Photometry:
     if vertical[0] not in {0.0, 90.0} or vertical[-1] not in {90.0, 180.0}:
         raise SceneError("vertical angles go from 0 or 90 to 90 or 180 degrees", ("vertical angles",))
     if horizontal[-1] not in _HORIZONTALS or horizontal[0] not in {0.0, 90.0, 180.0}:
-        raise SceneError("horizontal angles go from 0 to 0, 90, 180 or 360 degrees", ("horizontal angles",))
+        message = "horizontal angles go from 0 to 0, 90, 180 or 360 degrees, or from 90 to 270"
+        raise SceneError(message, ("horizontal angles",))
     candela = words.take(verticals * horizontals, "candela values").reshape(horizontals, verticals)
     scaled = candela * multiplier * ballast
     if (scaled < 0.0).any():

@@ -11,6 +11,9 @@ from solver.errors import SceneError
 _MOST_WORDS: Final = 100_000
 """Of one line."""
 
+_NAMING: Final = {"usemtl", "newmtl", "mtllib", "map_kd", "o", "g", "solid", "m", "v", "c"}
+"""Words that names follow."""
+
 
 def decoded(content: bytes) -> str:
     """The text of a file, whatever names in it are encoded by. Raises SceneError for binary data."""
@@ -25,15 +28,15 @@ def decoded(content: bytes) -> str:
 def numbered_lines(content: bytes) -> Iterator[tuple[int, list[str]]]:
     """Words of the lines that have any, with the number of the line from 1.
 
-    What follows # is left out, and a line that ends in a backslash goes on in the next. Raises SceneError.
+    Comments are left out, and a line that ends in a backslash goes on in the next. Raises SceneError.
     """
     words: list[str] = []
     first = 0
     for number, line in enumerate(decoded(content).splitlines(), start=1):
-        plain = line.partition("#")[0].rstrip()
+        plain = line.rstrip()
         goes_on = plain.endswith("\\")
         first = first or number
-        words += plain.removesuffix("\\").split()
+        words = _said([*words, *plain.removesuffix("\\").split()])
         if len(words) > _MOST_WORDS:
             raise SceneError(f"a line of more than {_MOST_WORDS} words", ("line", first))
         if goes_on:
@@ -43,6 +46,15 @@ def numbered_lines(content: bytes) -> Iterator[tuple[int, list[str]]]:
         words, first = [], 0
     if words:
         yield first, words
+
+
+def _said(words: list[str]) -> list[str]:
+    """`words` without a comment: it begins with #, which a name may hold, and the words of a name too."""
+    names = bool(words) and words[0].lower() in _NAMING
+    for k, word in enumerate(words):
+        if word == "#" or (word.startswith("#") and (k == 0 or not names)):
+            return words[:k]
+    return words
 
 
 def number_of(word: str, line: int) -> float:

@@ -74,7 +74,12 @@ def test_shapes_have_their_areas_and_lumens(shape: str, area: float) -> None:
     middle = surfaces.corners.reshape(-1, 3).mean(axis=0)
     outward = np.einsum("pc,pc->p", surfaces.normal, surfaces.corners.mean(axis=1) - middle)
     if shape.startswith(("sph", "cyl", "prism")):
-        assert (outward > 0).all() if shape != "sph a -2" else (outward < 0).all()
+        assert (outward < 0).all() if "-" in shape else (outward > 0).all()
+    if shape.startswith("prism"):
+        ends = sorted(surfaces.corners[..., 2].ravel())[:: len(surfaces.corners) * 4 - 1]
+        assert ends == ([-3, 0] if shape == "prism a b c d 3" else [0, 3]), (
+            "the polygon faces outwards, or in"
+        )
     if shape.startswith("ring"):
         assert surfaces.normal[:, 2].min() == pytest.approx(1)
 
@@ -110,7 +115,7 @@ def test_mirrors_keep_fronts_in_front() -> None:
     text = f"{CORNERS}m x =\nsides 1\nrd 0.5\nxf -mx\nf a b c d\nprism a b c d 1\nxf\n"
     surfaces = flatten(scene(read(text, "mgf")))
     assert surfaces.normal[0] == pytest.approx([0, 0, 1])
-    prism = surfaces.corners[1:].mean(axis=1) - [-0.5, 0.5, 0.5]
+    prism = surfaces.corners[1:].mean(axis=1) - [-0.5, 0.5, -0.5]
     assert (np.einsum("pc,pc->p", surfaces.normal[1:], prism) > 0).all()
 
 

@@ -85,6 +85,13 @@ def test_materials_come_in_an_archive() -> None:
     assert surfaces.normal[surfaces.emission.any(axis=1)][:1] == pytest.approx(np.array([[0, -1, 0]]))
 
 
+def test_names_may_hold_what_begins_comments() -> None:
+    text = "v 0 0 0 # origin\nv 1 0 0 #x\nv 0 1 0\no Box #1\nusemtl paint#2\nf 1 2 3 #face\n#f 1 1 1\n"
+    imported = read(text, "obj")
+    assert [o.id for o in imported.document.objects] == ["Box #1"]
+    assert "'paint#2'" in imported.warnings[0]
+
+
 def test_mirrors_are_those_that_trace_reflections() -> None:
     text = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl mirror\nf 1 2 3\n"
     (made,) = read(archive(a_obj=text, m_mtl=MTL), "zip").document.objects

@@ -88,18 +88,21 @@ def ring(center: Vector, normal: Vector, inner: float, outer: float) -> Solid | 
 
 
 def prism(base: Points, length: float) -> Solid | None:
-    """The closed solid that a polygon (n, 3) sweeps along its normal; None where it has none."""
+    """The closed solid that a polygon (n, 3) sweeps away from its normal, so that it faces outwards.
+
+    By a negative length it sweeps the other way, and is seen from within. None where nothing is swept.
+    """
     doubled = np.cross(base[1:-1] - base[0], base[2:] - base[0]).sum(axis=0)
     size = float(np.linalg.norm(doubled))
     if size <= 0.0 or length == 0.0:
         return None
     n = len(base)
-    vertices = np.concatenate([base, base + length * doubled / size])
-    lower, upper = list(range(n))[::-1], list(range(n, 2 * n))
-    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    vertices = np.concatenate([base, base - length * doubled / size])
+    face, opposite = list(range(n)), list(range(n, 2 * n))[::-1]
+    sides = [[(k + 1) % n, k, n + k, n + (k + 1) % n] for k in range(n)]
     edges = np.roll(base, -1, axis=0) - base
     area = size + abs(length) * float(np.linalg.norm(edges, axis=1).sum())
-    return _turned(Solid(vertices, [lower, upper, *sides], area), length < 0.0)
+    return Solid(vertices, [face, opposite, *sides], area)
 
 
 _FLAT: Final = (np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
