@@ -19,7 +19,8 @@ setup:
 setup-dev:
 	@scripts/setup.sh --dev
 
-serve: setup ## serve on 127.0.0.1:8000, or on HOST and PORT
+serve: export HALFLIGHT_DATA_DIR ?= $(or $(XDG_STATE_HOME),$(HOME)/.local/state)/halflight
+serve: setup ## serve on 127.0.0.1:8000, or on HOST and PORT; sessions are kept in HALFLIGHT_DATA_DIR
 	@exec .venv/bin/halflight serve
 
 test: setup-dev ## run the tests, but for the slow ones (PYTEST_ARGS="-k name")

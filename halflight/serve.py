@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 from halflight.console import ExitCode, fail
 from service.config import ServiceSettings
 
-_ENVIRONMENT_ONLY: Final = {"token"}
+_ENVIRONMENT_ONLY: Final = {"token", "tokens"}
 """What the list of processes should not show."""
 
 _ENVIRONMENT: Final = {"host": "HOST", "port": "PORT"}
@@ -23,6 +23,7 @@ _ENVIRONMENT: Final = {"host": "HOST", "port": "PORT"}
 def run(settings: ServiceSettings) -> None:
     """Serve until interrupted."""
     from service.hosting.remote import WorkerNotStartedError
+    from service.journal.store import JournalError
     from service.server import serve as serve_until_interrupted
 
     try:
@@ -31,7 +32,7 @@ def run(settings: ServiceSettings) -> None:
         # What follows in parentheses is the address once more.
         reason = (refused.strerror or str(refused)).lower().partition(" (")[0]
         fail(f"cannot listen on {settings.host} port {settings.port}: {reason}", ExitCode.UNABLE)
-    except WorkerNotStartedError as refused:
+    except (WorkerNotStartedError, JournalError) as refused:
         fail(str(refused), ExitCode.UNABLE)
 
 

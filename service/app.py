@@ -14,6 +14,7 @@ from service.config import ServiceSettings
 from service.context import Context, require_token
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Sessions
+from service.journal.journal import Journal
 from service.json_body import BodyLimit
 from service.metrics import Metrics, RequestMetrics
 from service.openapi import describe, version
@@ -32,6 +33,7 @@ from service.routes import (
     stream,
 )
 from service.routes import sessions as session_routes
+from service.session_metrics import SessionMetrics
 
 
 def create_app(settings: ServiceSettings | None = None) -> FastAPI:
@@ -39,7 +41,10 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
     chosen = settings or ServiceSettings()
     metrics = Metrics()
     pool = WorkerPool(chosen.pool_size, chosen.refill_delay, metrics.workers_lost.inc)
-    sessions = Sessions(pool, chosen.max_sessions, chosen.idle_seconds)
+    lives = SessionMetrics(metrics.registry)
+    journal = Journal(chosen.data_dir, lives.commits.observe)
+    sessions = Sessions(pool, journal, chosen.quotas, chosen.terms, lives)
+    lives.follow(sessions.count_by_state)
     metrics.sessions.set_function(lambda: len(sessions))
     metrics.warm_workers.set_function(lambda: pool.stock)
     app = FastAPI(
@@ -52,7 +57,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
         ],
         redoc_url=None,
     )
-    app.state.context = Context(chosen, pool, sessions, metrics)
+    app.state.context = Context(chosen, pool, journal, sessions, metrics)
     problems.install(app)
     app.include_router(pages.router)
     for routes in (
@@ -68,12 +73,11 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
 @asynccontextmanager
 async def _life(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    await context.pool.begin()
-    expiring = asyncio.create_task(context.sessions.expire_forever())
+    await context.begin()
+    tidying = asyncio.create_task(context.sessions.tidy_forever())
     try:
         yield
     finally:
-        expiring.cancel()
-        await asyncio.gather(expiring, return_exceptions=True)
-        await context.sessions.close()
-        await context.pool.close()
+        tidying.cancel()
+        await asyncio.gather(tidying, return_exceptions=True)
+        await context.end()

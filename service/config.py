@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from pydantic import AliasChoices, Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from service.hosting.lasting import Terms
+from service.hosting.sessions import Quotas
 from solver.document.limits import SceneLimits
 from solver.engine.requests import FrameLimits
 from solver.errors import LimitExceededError
@@ -35,7 +38,19 @@ class ServiceSettings(BaseSettings):
         description="Port to listen on; 0 takes a free one.",
     )
     token: SecretStr | None = Field(
-        default=None, min_length=1, description="Where given, /v1 and /metrics ask for it as a bearer token."
+        default=None,
+        min_length=1,
+        description="Where given, /v1 and /metrics ask for it as a bearer token. It opens all sessions.",
+    )
+    tokens: SecretStr | None = Field(
+        default=None,
+        min_length=1,
+        description="More bearer tokens, by comma. Each opens the sessions alone that it has made.",
+    )
+    data_dir: Path | None = Field(
+        default=None,
+        description="Directory in which sessions are kept, so that they outlast the service. No two services "
+        "may share one. Without, they outlast their workers alone.",
     )
     pool_size: int = Field(default=2, ge=0, le=64, description="Workers kept warm for the next sessions.")
     refill_delay: float = Field(
@@ -44,9 +59,19 @@ class ServiceSettings(BaseSettings):
         description="Seconds that a new session has the cores to itself before the pool refills.",
     )
     idle_seconds: float = Field(
-        default=1800.0, gt=0.0, description="A session that nobody has used for this long is ended."
+        default=1800.0,
+        gt=0.0,
+        description="A session that nobody has used for this long is put to sleep: its process is ended, and "
+        "the next request wakes it.",
     )
-    max_sessions: _Count = Field(default=16, description="Sessions at once.")
+    expire_seconds: float = Field(
+        default=604_800.0, gt=0.0, description="A session that nobody has used for this long is deleted."
+    )
+    wake_seconds: float = Field(
+        default=30.0, gt=0.0, description="Longest wait for a session that is being brought back."
+    )
+    max_sessions: _Count = Field(default=16, description="Sessions awake at once.")
+    max_kept_sessions: _Count = Field(default=1000, description="Sessions in all, sleeping ones too.")
     max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
     max_message_bytes: _Count = Field(default=4 * 2**20, description="Bytes of a message on a stream.")
     stream_idle_seconds: float = Field(
@@ -65,6 +90,16 @@ class ServiceSettings(BaseSettings):
     max_probe_points: _Count = Field(default=10_000, description="Points of a probe.")
     max_edits: _Count = Field(default=1000, description="Edits in a batch.")
     max_wait_ms: _Count = Field(default=600_000, description="Longest wait for a frame, whatever is asked.")
+
+    @property
+    def quotas(self) -> Quotas:
+        """How many sessions may be, and how long."""
+        return Quotas(self.max_sessions, self.max_kept_sessions, self.idle_seconds, self.expire_seconds)
+
+    @property
+    def terms(self) -> Terms:
+        """What holds for all sessions."""
+        return Terms(self.scene_limits, self.frame_limits, self.wake_seconds)
 
     @property
     def scene_limits(self) -> SceneLimits:

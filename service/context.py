@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias, cast
@@ -13,8 +12,9 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from service.config import ServiceSettings
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Session, Sessions
+from service.journal.journal import Journal
 from service.metrics import Metrics
-from service.problems import UNAUTHORIZED, ProblemError
+from service.ownership import owner_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,24 @@ class Context:
 
     settings: ServiceSettings
     pool: WorkerPool
+    journal: Journal
     sessions: Sessions
     metrics: Metrics
+
+    async def begin(self) -> None:
+        """Have a worker warm, and all sessions that are kept; nothing where that is so.
+
+        Raises WorkerNotStartedError, JournalError.
+        """
+        if self.journal.open():
+            await self.sessions.load()
+        await self.pool.begin()
+
+    async def end(self) -> None:
+        """End all processes; what is kept stays."""
+        await self.sessions.close()
+        await self.pool.close()
+        await self.journal.close()
 
 
 def context_of(request: Request) -> Context:
@@ -39,26 +55,19 @@ _bearer = HTTPBearer(auto_error=False, description="Needed only where the servic
 
 def require_token(
     context: Ctx, given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
-) -> None:
-    """Raise ProblemError where the service has a token and the request does not."""
-    token = context.settings.token
-    if token is None:
-        return
-    if given is None or not secrets.compare_digest(
-        given.credentials.encode(), token.get_secret_value().encode()
-    ):
-        raise ProblemError(
-            UNAUTHORIZED,
-            "send the service's token as Authorization: Bearer <token>",
-            headers={"WWW-Authenticate": "Bearer"},
-        )
+) -> str | None:
+    """Whose sessions the request may see, as `owner_of` tells it. Raises ProblemError."""
+    return owner_of(b"" if given is None else given.credentials.encode(), context.settings)
+
+
+Owner: TypeAlias = Annotated[str | None, Depends(require_token)]
 
 
 async def session_of(
-    context: Ctx, session_id: Annotated[str, Path(alias="id", description="The session's id.")]
+    context: Ctx, owner: Owner, session_id: Annotated[str, Path(alias="id", description="The session's id.")]
 ) -> AsyncIterator[Session]:
-    """The session that the path names, kept from expiring while the request lasts."""
-    with context.sessions.find(session_id).in_use() as session:
+    """The session that the path names, kept awake while the request lasts."""
+    with context.sessions.find(session_id, owner).in_use() as session:
         yield session
 
 

@@ -67,6 +67,11 @@ class Metrics:
         )
 
     @property
+    def registry(self) -> CollectorRegistry:
+        """What others count is told with these."""
+        return self._registry
+
+    @property
     def content_type(self) -> str:
         """The media type of `text`."""
         return CONTENT_TYPE_LATEST

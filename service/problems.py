@@ -14,9 +14,11 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from service.cancellation import ClientGoneError
+from service.hosting.lasting import KeyUsedError
 from service.hosting.messages import Refusal, RefusalKind
 from service.hosting.remote import RefusedError, WorkerGoneError
 from service.hosting.sessions import NoSuchSessionError, TooManySessionsError
+from service.journal.store import JournalError
 from solver.errors import LimitExceededError, SceneError
 
 MEDIA_TYPE: Final = "application/problem+json"
@@ -61,6 +63,8 @@ UNAUTHORIZED: Final = Kind("unauthorized", 401, "A bearer token is needed")
 FORBIDDEN: Final = Kind("forbidden", 403, "This is not allowed")
 UPGRADE: Final = Kind("upgrade-required", 426, "This call takes another protocol")
 NOT_AVAILABLE: Final = Kind("not-available", 501, "This version cannot do that yet")
+KEY_USED: Final = Kind("key-used", 422, "The key came with another request before")
+NOT_KEPT: Final = Kind("not-kept", 503, "The session cannot be written or read")
 WORKER_GONE: Final = Kind("worker-gone", 503, "The session's worker is gone")
 NO_RENDERING: Final = Kind("no-rendering", 503, "This machine cannot draw frames")
 UNSUPPORTED_MEDIA: Final = Kind("unsupported-media-type", 415, "The body is not JSON")
@@ -158,9 +162,13 @@ class ProblemError(HTTPException):
             case NoSuchSessionError():
                 return cls(NO_SUCH_SESSION, str(error))
             case TooManySessionsError():
-                return cls(TOO_MANY_SESSIONS, str(error))
+                return cls(TOO_MANY_SESSIONS, str(error), headers=_later(error))
             case WorkerGoneError():
-                return cls(WORKER_GONE, str(error))
+                return cls(WORKER_GONE, str(error), headers=_later(error))
+            case KeyUsedError():
+                return cls.of_field(KEY_USED, ["header", "Idempotency-Key"], str(error))
+            case JournalError():
+                return cls(NOT_KEPT, "the change could not be kept, and is not made", headers=_later(error))
 
     @property
     def problem(self) -> Problem:
@@ -175,6 +183,8 @@ ToldError: TypeAlias = (
     | NoSuchSessionError
     | TooManySessionsError
     | WorkerGoneError
+    | KeyUsedError
+    | JournalError
 )
 """What is raised to be told a client"""
 
@@ -229,7 +239,7 @@ def install(app: FastAPI) -> None:
         if not isinstance(error, TOLD):
             raise error
         told = ProblemError.of_error(error, "query" if request.method == "GET" else "body")
-        return respond(told.kind, told.detail, told.errors)
+        return respond(told.kind, told.detail, told.errors, told.headers)
 
     for kind in TOLD:
         if kind is not ProblemError:
@@ -243,6 +253,12 @@ def install(app: FastAPI) -> None:
     async def of_anything(_: Request, __: Exception) -> JSONResponse:
         # Starlette raises the exception again once this is sent, so that the server logs it.
         return respond(INTERNAL, "the service met an error that it did not expect, and has logged it")
+
+
+def _later(error: Exception) -> dict[str, str]:
+    """The header that says when to try again, where that helps."""
+    seconds = getattr(error, "retry_after", None)
+    return {} if seconds is None else {"Retry-After": str(seconds)}
 
 
 def _location(found: Mapping[str, Any]) -> list[str | int]:

@@ -58,6 +58,10 @@ class SessionStatus(BaseModel):
     )
     warnings: list[str]
     settings: SettingsDocument
+    awake: bool = Field(
+        default=True,
+        description="Whether a process holds the session; the next request wakes one that sleeps.",
+    )
 
     @classmethod
     def of(cls, session_id: str, status: EngineStatus) -> SessionStatus:
@@ -77,9 +81,29 @@ class SessionStatus(BaseModel):
 
     @classmethod
     def lost(cls, session_id: str, last: EngineStatus) -> SessionStatus:
-        """The wire's form of the last status of a session whose worker has ended."""
-        warnings = (*last.warnings, "The worker of this session has ended: delete it and post it anew.")
+        """The wire's form of the last status of a session that cannot be brought back now."""
+        warnings = (
+            *last.warnings,
+            "The worker of this session has ended, and it cannot be brought back now.",
+        )
         return cls.of(session_id, replace(last, state=SessionState.FAILED, warnings=warnings))
+
+    @classmethod
+    def asleep(cls, session_id: str, name: str, revision: int, settings: SettingsDocument) -> SessionStatus:
+        """The wire's form of a session that sleeps: of its light nothing is left."""
+        return cls(
+            id=session_id,
+            name=name,
+            revision=revision,
+            state=SessionState.PAUSED,
+            progress=0.0,
+            error_estimate=1.0,
+            unshot_fraction=1.0,
+            statistics={},
+            warnings=["The session sleeps: the next request wakes it, and its light settles anew."],
+            settings=settings,
+            awake=False,
+        )
 
 
 class SessionList(BaseModel):

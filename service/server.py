@@ -40,9 +40,12 @@ class Server(uvicorn.Server):
         self._address = address
 
     async def run_on(self, listening: socket.socket) -> None:
-        """Serve on a socket, once a worker is warm. Raises WorkerNotStartedError."""
-        await self._context.pool.begin()
-        await self.serve([listening])
+        """Serve on a socket, once a worker is warm. Raises WorkerNotStartedError, JournalError."""
+        await self._context.begin()
+        try:
+            await self.serve([listening])
+        finally:
+            await self._context.end()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to serve, and say so."""
@@ -60,7 +63,8 @@ class Server(uvicorn.Server):
 def serve(settings: ServiceSettings | None = None) -> None:
     """Serve until interrupted or terminated.
 
-    Raises OSError where the address cannot be taken, WorkerNotStartedError where nothing can be solved here.
+    Raises OSError where the address cannot be taken, WorkerNotStartedError where nothing can be solved here,
+    JournalError where sessions cannot be kept.
     """
     chosen = settings or ServiceSettings()
     with _listen(chosen.host, chosen.port) as listening:

@@ -21,6 +21,7 @@ from solver.engine.lightmaps.bake import LightmapRequest
 from solver.engine.lightmaps.files import LightmapFormat
 from solver.engine.overlays.base import OverlayRequest
 from solver.engine.overlays.files import OverlayFormat
+from solver.engine.past import Past
 from solver.engine.picking import PickResult
 from solver.engine.requests import CameraChoice, Encoding, FrameLimits, FrameRequest, Wait
 from solver.engine.status import Change, EngineStatus, ProbeResult
@@ -41,9 +42,9 @@ AnyRequest: TypeAlias = Request[Any]
 
 @dataclass(frozen=True)
 class Open(Request[EngineStatus]):
-    """Make the worker's engine. Its first request."""
+    """Make the worker's engine, of a scene or of what a session was before. Its first request."""
 
-    scene: Scene
+    scene: Scene | Past
     settings: LightSettings
     limits: SceneLimits
     frame_limits: FrameLimits

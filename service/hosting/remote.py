@@ -24,10 +24,12 @@ _FAREWELL: Final = 2.0
 
 
 class WorkerGoneError(Exception):
-    """The worker has ended, and with it what it held."""
+    """The worker has ended."""
+
+    retry_after = 2
 
     def __init__(self) -> None:
-        super().__init__("the worker process of this session has ended; delete the session and post it anew")
+        super().__init__("the worker process of this session has ended; nothing of the session is lost")
 
 
 class WorkerNotStartedError(WorkerGoneError):

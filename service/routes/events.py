@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from service.context import UsedSession
-from service.hosting.remote import WorkerGoneError
+from service.hosting.messages import GetStatus
 from service.hosting.sessions import Session
 from service.problems import responses
 from service.schemas import SessionStatus
@@ -17,10 +17,9 @@ from service.schemas import SessionStatus
 router = APIRouter(prefix="/v1", tags=["sessions"])
 
 
-def living(session: UsedSession) -> Session:
-    """The session that the path names. Raises WorkerGoneError where its worker has ended."""
-    if session.worker.gone:
-        raise WorkerGoneError
+async def living(session: UsedSession) -> Session:
+    """The session that the path names, awake. Raises what waking does."""
+    await session.worker.call(GetStatus())
     return session
 
 

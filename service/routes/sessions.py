@@ -6,10 +6,11 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
-from service.context import Ctx, UsedSession
+from service.context import Ctx, Owner, UsedSession
 from service.file_body import FileRoute
 from service.file_query import described
 from service.hosting.messages import Configure, GetScene, GetStatus, Open
+from service.hosting.sessions import Session
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
 from service.schemas import SceneAnswer, SessionList, SessionRequest, SessionStatus
@@ -29,7 +30,7 @@ _opening = APIRouter(route_class=FileRoute)
     "/sessions", status_code=201, openapi_extra=described(), responses=responses(413, 422, 429, 503)
 )
 async def open_session(
-    body: SessionRequest, request: Request, response: Response, context: Ctx
+    body: SessionRequest, request: Request, response: Response, context: Ctx, owner: Owner
 ) -> SessionStatus:
     """Open a session on a scene. The solve starts at once.
 
@@ -41,7 +42,7 @@ async def open_session(
     limits.check_solver(settings)
     scene = await asyncio.to_thread(_scene, body, limits.scene_limits)
     opening = Open(scene, settings, limits.scene_limits, limits.frame_limits)
-    session, status = await context.sessions.open(opening)
+    session, status = await context.sessions.open(opening, owner or "")
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
     return SessionStatus.of(session.id, status)
@@ -64,17 +65,18 @@ def _scene(body: SessionRequest, limits: SceneLimits) -> Scene:
 
 
 @router.get("/sessions")
-async def list_sessions(context: Ctx) -> SessionList:
+async def list_sessions(context: Ctx, owner: Owner) -> SessionList:
     """The sessions that the service holds."""
     return SessionList(
-        sessions=[
-            SessionStatus.lost(session.id, status)
-            if session.worker.gone
-            else SessionStatus.of(session.id, status)
-            for session in context.sessions
-            if (status := session.worker.status) is not None
-        ]
+        sessions=[_listed(session) for session in context.sessions if owner in (None, session.owner)]
     )
+
+
+def _listed(session: Session) -> SessionStatus:
+    status = session.worker.status
+    if status is None:
+        return SessionStatus.asleep(session.id, session.name, session.revision, session.settings)
+    return (SessionStatus.lost if session.worker.gone else SessionStatus.of)(session.id, status)
 
 
 @router.get("/sessions/{id}", responses=responses(404, 503))
@@ -84,9 +86,9 @@ async def session_status(session: UsedSession) -> SessionStatus:
 
 
 @router.delete("/sessions/{id}", status_code=204, responses=responses(404))
-async def end_session(id: str, context: Ctx) -> None:
+async def end_session(id: str, context: Ctx, owner: Owner) -> None:
     """End a session and free all that it holds."""
-    await context.sessions.end(id)
+    await context.sessions.end(id, owner)
 
 
 @router.get("/sessions/{id}/scene", response_model_exclude_unset=True, responses=responses(404, 503))

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import base64
 import binascii
-import secrets
 from typing import Annotated, Final
 from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Depends, Path, WebSocket
 
 from service.context import Context, session_of
-from service.hosting.remote import WorkerGoneError
 from service.hosting.sessions import Session
-from service.problems import FORBIDDEN, TOLD, UNAUTHORIZED, UPGRADE, ProblemError, respond
+from service.ownership import owner_of
+from service.problems import FORBIDDEN, TOLD, UPGRADE, ProblemError, respond
 from service.streaming.connection import Connection
 
 PROTOCOL: Final = "halflight.v1"
@@ -55,18 +54,10 @@ def _admitted(socket: WebSocket, session_id: str, context: Context) -> Session:
     origin = socket.headers.get("origin")
     if origin is not None and urlsplit(origin).netloc != socket.headers.get("host"):
         raise ProblemError(FORBIDDEN, "pages of other origins may not open streams")
-    token = context.settings.token
-    if token is not None and not secrets.compare_digest(_token(socket), token.get_secret_value().encode()):
-        raise ProblemError(
-            UNAUTHORIZED,
-            "send the service's token as Authorization: Bearer <token>, "
-            "or offer the subprotocol bearer.<token in base64url>",
-            headers={"WWW-Authenticate": "Bearer"},
-        )
-    session = context.sessions.find(session_id)
-    if session.worker.gone:
-        raise WorkerGoneError
-    return session
+    owner = owner_of(
+        _token(socket), context.settings, ", or offer the subprotocol bearer.<token in base64url>"
+    )
+    return context.sessions.find(session_id, owner)
 
 
 def _token(socket: WebSocket) -> bytes:

@@ -7,15 +7,17 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.testclient import WebSocketDenialResponse
 
 from service.app import create_app
 from service.config import ServiceSettings
-from service.hosting import remote
+from service.hosting import remote, sessions
 from tests.engine.scenes import box_document
 from tests.service.conftest import LOOSE, context_of, open_box
 from tests.service.problem import fields_at_fault, problem_of
@@ -169,6 +171,7 @@ def test_limits_are_told_and_free_what_was_taken() -> None:
         path = open_box(client)
         answer = client.post("/v1/sessions", json={"scene": {}})
         assert problem_of(answer, 429)["type"] == "urn:halflight:too-many-sessions"
+        assert int(answer.headers["retry-after"]) > 0
         added = [{"op": "add", "object": {**square, "id": name}} for name in "ab"]
         assert "polygons" in problem_of(client.post(f"{path}/edits", json={"edits": added}), 413)["detail"]
         moves = [{"op": "move", "id": "crate", "transform": {}}] * 3
@@ -183,17 +186,64 @@ def test_limits_are_told_and_free_what_was_taken() -> None:
         assert client.delete(open_box(client)).status_code == 204, "there is room again"
 
 
-def test_an_idle_session_expires() -> None:
-    with service(pool_size=1, refill_delay=60.0, idle_seconds=0.4) as client:
+def eventually(holds: Callable[[], bool]) -> bool:
+    deadline = time.monotonic() + 30.0
+    while not holds():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def test_an_idle_session_sleeps_until_it_is_needed() -> None:
+    with service(pool_size=2, refill_delay=0.0, idle_seconds=0.4) as client:
+        path = open_box(client)
+        edits = {"edits": [{"op": "remove", "id": "crate"}]}
+        assert client.post(f"{path}/edits", json=edits).json()["revision"] == 2
+        assert client.patch(f"{path}/settings", json={"error_tolerance": 0.04}).status_code == 200
+        pid = context_of(client).sessions.find(path.rpartition("/")[2]).worker.pid
+
+        def listed() -> dict[str, Any]:
+            (entry,) = client.get("/v1/sessions").json()["sessions"]
+            assert isinstance(entry, dict)
+            return entry
+
+        assert eventually(lambda: not listed()["awake"])
+        assert eventually(lambda: not is_running(pid))
+        asleep = listed()
+        assert (asleep["state"], asleep["revision"], asleep["progress"]) == ("paused", 2, 0.0)
+        assert asleep["settings"]["error_tolerance"] == 0.04
+        assert asleep["name"] == "box"
+        assert 'halflight_sessions_by_state{state="asleep"} 1.0' in client.get("/metrics").text
+        status = client.get(path).json()
+        assert (status["awake"], status["revision"]) == (True, 2)
+        assert status["settings"] == asleep["settings"]
+        assert client.post(f"{path}/undo").json()["revision"] == 3
+        assert client.delete(path).status_code == 204
+        assert client.get("/v1/sessions").json() == {"sessions": []}
+
+
+def test_a_session_that_nobody_wants_expires() -> None:
+    with service(pool_size=1, refill_delay=60.0, expire_seconds=0.4) as client:
         path = open_box(client)
         pid = context_of(client).sessions.find(path.rpartition("/")[2]).worker.pid
-        deadline = time.monotonic() + 30.0
-        while client.get("/v1/sessions").json()["sessions"] and time.monotonic() < deadline:
-            time.sleep(0.05)
+        assert eventually(lambda: client.get("/v1/sessions").json() == {"sessions": []})
         problem_of(client.get(path), 404)
-        while is_running(pid) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert not is_running(pid)
+        assert eventually(lambda: not is_running(pid))
+
+
+def test_who_dozes_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "_DOZING", 0.0)
+    with service(pool_size=2, refill_delay=0.0, max_sessions=1, max_kept_sessions=2) as client:
+        first, second = open_box(client), open_box(client)
+        awake = {f"/v1/sessions/{s['id']}": s["awake"] for s in client.get("/v1/sessions").json()["sessions"]}
+        assert awake == {first: False, second: True}
+        answer = client.post("/v1/sessions", json={"scene": {}})
+        assert "kept" in problem_of(answer, 429)["detail"]
+        assert int(answer.headers["retry-after"]) > 0
+        assert client.get(first).json()["awake"]
+        for path in (first, second):
+            assert client.delete(path).status_code == 204
 
 
 def test_a_used_session_does_not_expire() -> None:
@@ -216,6 +266,34 @@ def test_a_token_is_asked_for_where_there_is_one() -> None:
             assert client.get(path, headers={"Authorization": "Bearer secret"}).status_code == 200
         assert client.get("/healthz").status_code == 200
         assert client.get("/").status_code == 200
+
+
+def test_a_token_opens_its_own_sessions_alone() -> None:
+    settings = ServiceSettings.model_validate({"token": "all", "tokens": "ann, ben", "pool_size": 0})
+    ann, ben, every = ({"Authorization": f"Bearer {token}"} for token in ("ann", "ben", "all"))
+    with TestClient(create_app(settings)) as client:
+        problem_of(client.get("/v1/sessions"), 401)
+        answer = client.post("/v1/sessions", json={"scene": box_document(), "settings": LOOSE}, headers=ann)
+        path = answer.headers["location"]
+        for told in (
+            client.get(path, headers=ben),
+            client.get(f"{path}/scene", headers=ben),
+            client.get(f"{path}/frame", headers=ben),
+            client.post(f"{path}/undo", headers=ben),
+            client.delete(path, headers=ben),
+        ):
+            assert problem_of(told, 404)["type"] == "urn:halflight:no-such-session"
+        with (
+            pytest.raises(WebSocketDenialResponse) as denied,
+            client.websocket_connect(f"{path}/stream", headers=ben),
+        ):
+            pass
+        assert denied.value.status_code == 404
+        assert client.get("/v1/sessions", headers=ben).json() == {"sessions": []}
+        for own in (ann, every):
+            assert client.get(path, headers=own).status_code == 200
+            assert len(client.get("/v1/sessions", headers=own).json()["sessions"]) == 1
+        assert client.delete(path, headers=every).status_code == 204
 
 
 def test_a_worker_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

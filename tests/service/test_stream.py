@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
+import os
+import signal
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -257,15 +259,19 @@ def test_a_stream_ends_with_its_session(client: TestClient) -> None:
     assert end.value.code == 4410
 
 
-def test_a_stream_ends_with_its_worker(client: TestClient) -> None:
+def test_a_stream_outlasts_a_worker(client: TestClient) -> None:
     path = open_box(client)
     worker = context_of(client).sessions.find(path.rpartition("/")[2]).worker
     with viewing(client, path) as viewer:
-        worker._process.kill()
-        with pytest.raises(WebSocketDisconnect) as end:
-            while True:
-                viewer.see()
-    assert end.value.code == 4503
+        viewer.say("camera", **SIZE)
+        viewer.see()
+        os.kill(worker.pid, signal.SIGKILL)
+        viewer.say("edits", id="e", edits=[{"op": "remove", "id": "crate"}])
+        assert viewer.hear("edited")["revision"] == 2
+        viewer.say("camera", id="after", **SIZE)
+        while (seen := viewer.see()).header["id"] != "after":
+            pass
+        assert seen.header["revision"] == 2
     assert client.delete(path).status_code == 204
 
 

@@ -1,0 +1,1 @@
+"""What sessions must not lose: every accepted change, on disk before it is answered."""
