@@ -78,8 +78,8 @@ class _Sent:
     number: int
     at: float
     quality: Quality
-    drawn_in: float
-    """Seconds"""
+    took: float
+    """Seconds in the worker"""
 
 
 class Feed:
@@ -114,8 +114,7 @@ class Feed:
             sent = self._unacknowledged.popleft()
             self._metrics.stream_round_trips.observe(now - sent.at)
             if sent.quality is Quality.MOVING:
-                # What it waited for the solver's step to end would be no less for a coarser frame.
-                self._pace.took(sent.drawn_in + now - sent.at)
+                self._pace.took(sent.took + now - sent.at)
         self._stir.set()
 
     async def run(self) -> None:
@@ -183,7 +182,7 @@ class Feed:
         camera = self._camera
         if camera is None:
             return
-        revision, standing = self._revision, self._standing()
+        revision, standing, start = self._revision, self._standing(), time.monotonic()
         try:
             answer = await self._fetch(self._request(camera, ask), ask, revision)
         except RefusedError as error:
@@ -202,7 +201,7 @@ class Feed:
         is_worth = answer.outlook.drawable or answer.outlook.renderer not in _NOT_YET
         self._shown = _Shown(ask.view, ask.quality, answer, is_worth, standing)
         if answer.content is not None and is_worth:
-            await self._send(camera, ask, answer, answer.content)
+            await self._send(camera, ask, answer, answer.content, time.monotonic() - start)
 
     def _request(self, camera: CameraMessage, ask: _Ask) -> GetFrame:
         frame = camera.frame
@@ -236,9 +235,11 @@ class Feed:
             if not fetching.cancelled():
                 fetching.exception()  # whoever is left to hear of it, it is not the log
 
-    async def _send(self, camera: CameraMessage, ask: _Ask, answer: FrameAnswer, content: bytes) -> None:
+    async def _send(
+        self, camera: CameraMessage, ask: _Ask, answer: FrameAnswer, content: bytes, took: float
+    ) -> None:
         self._number += 1
-        self._unacknowledged.append(_Sent(self._number, time.monotonic(), ask.quality, answer.seconds))
+        self._unacknowledged.append(_Sent(self._number, time.monotonic(), ask.quality, took))
         header = FrameHeader(
             number=self._number,
             id=camera.id,

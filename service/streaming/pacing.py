@@ -1,7 +1,7 @@
 """How good the frames of a stream are: coarse while its view moves, as good as they get where it rests.
 
 A view moves while cameras, or revisions of the scene, come closer together than `STILL`. How coarse its
-frames are then follows from what they take on their way, so that there are always some twenty a second,
+frames are then follows from what they take on their way, so that there are always ten a second or more,
 if only of few pixels.
 """
 
@@ -15,10 +15,10 @@ from typing import Final
 STILL: Final = 0.15
 """Seconds without another camera after which a view rests"""
 
-_TOO_SLOW: Final = 0.06
-"""Seconds; frames that take longer are made coarser"""
+_TOO_SLOW: Final = 0.09
+"""Seconds; frames that take longer are made coarser. A fifth of it may be the solver's step before."""
 
-_QUICK: Final = 0.024
+_QUICK: Final = 0.04
 """Seconds; frames that take less may be finer. The next step has at most 2.3 times the pixels."""
 
 
@@ -77,7 +77,7 @@ class Pace:
         return LADDER[self._step]
 
     def took(self, seconds: float) -> None:
-        """A frame of a moving view took so long to be drawn and to arrive."""
+        """A frame of a moving view took so long to be made and to arrive."""
         if seconds > _TOO_SLOW:
             self._step = min(self._step + 1, len(LADDER) - 1)
         elif seconds < _QUICK:

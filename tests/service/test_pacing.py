@@ -31,8 +31,8 @@ def test_slow_frames_become_coarser_and_quick_ones_finer(times: list[float]) -> 
         pace.took(seconds)
         step = LADDER.index(pace.coarseness) - before
         assert step in {-1, 0, 1}
-        assert step <= 0 or seconds > 0.05
-        assert step >= 0 or seconds < 0.03
+        assert step <= 0 or seconds > 0.08
+        assert step >= 0 or seconds < 0.05
 
 
 def test_no_step_of_the_ladder_turns_a_quick_frame_into_a_slow_one() -> None:
