@@ -30,6 +30,7 @@ from service.routes import (
     picks,
     probe,
     scenes,
+    snapshots,
     stream,
 )
 from service.routes import sessions as session_routes
@@ -62,7 +63,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
     app.include_router(pages.router)
     for routes in (
         scenes, files, session_routes, edits, frames, probe, picks, overlays, lightmaps, exports, events,
-        stream,
+        stream, snapshots,
     ):  # fmt: skip
         app.include_router(routes.router, dependencies=[Depends(require_token)])
     app.include_router(stream.sockets)

@@ -7,6 +7,7 @@ from typing import Annotated, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.journal.documents import Snapshot
 from solver.document.edits import Edit
 from solver.document.fields import Closed, Direction, Point
 from solver.document.models import SceneDocument
@@ -19,7 +20,7 @@ Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class SessionRequest(Closed):
-    """A scene to be solved: one given here, or one that ships with the service, by name."""
+    """A scene to be solved: one given here, one that ships with the service, by name, or a snapshot's."""
 
     scene: SceneDocument | None = None
     sample: str | None = Field(
@@ -29,6 +30,9 @@ class SessionRequest(Closed):
         max_length=200,
         description="A name from `GET /v1/scenes`, in place of `scene`.",
         examples=["cornell"],
+    )
+    snapshot: Snapshot | None = Field(
+        default=None, description="What `GET …/snapshot` gave, in place of `scene`: a session with a history."
     )
     settings: SettingsDocument = SettingsDocument()
 

@@ -16,7 +16,7 @@ from service.hosting.lasting import LastingWorker, Terms
 from service.hosting.messages import Open
 from service.hosting.pool import WorkerPool
 from service.hosting.remote import RefusedError, RemoteWorker
-from service.journal.documents import text_of
+from service.journal.documents import Snapshot, text_of
 from service.journal.journal import Journal
 from service.journal.recollection import snapshot_of
 from service.journal.store import JournalError, Kept
@@ -107,6 +107,11 @@ class Session:
     def settings(self) -> SettingsDocument:
         """The latest that are known."""
         return self._settings
+
+    async def restore(self, snapshot: Snapshot) -> None:
+        """Be what `snapshot` tells from now on. Raises JournalError."""
+        await self.worker.restore(snapshot, snapshot.scene.name)
+        self.name = snapshot.scene.name
 
     def _note(self) -> None:
         status = self.worker.status

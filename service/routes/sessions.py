@@ -6,6 +6,7 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
+from service.config import ServiceSettings
 from service.context import Ctx, Owner, UsedSession
 from service.file_body import FileRoute
 from service.file_query import described
@@ -14,13 +15,16 @@ from service.hosting.sessions import Session
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
 from service.schemas import SceneAnswer, SessionList, SessionRequest, SessionStatus
+from service.snapshots import accepted
 from solver.document.conversion import document_of, scene_of
 from solver.document.limits import SceneLimits
 from solver.document.models import SceneDocument
 from solver.document.samples import load_sample
 from solver.document.settings import SettingsDocument
+from solver.engine.past import Past
 from solver.errors import SceneError
 from solver.geometry.scene import Scene
+from solver.illumination.settings import LightSettings
 
 router = APIRouter(prefix="/v1", tags=["sessions"], route_class=JsonRoute)
 _opening = APIRouter(route_class=FileRoute)
@@ -38,9 +42,7 @@ async def open_session(
     not keep is among the session's warnings.
     """
     limits = context.settings
-    settings = body.settings.changes_to(limits.solver_defaults)
-    limits.check_solver(settings)
-    scene = await asyncio.to_thread(_scene, body, limits.scene_limits)
+    scene, settings = await asyncio.to_thread(_start, body, limits)
     opening = Open(scene, settings, limits.scene_limits, limits.frame_limits)
     session, status = await context.sessions.open(opening, owner or "")
     context.metrics.sessions_opened.inc()
@@ -51,9 +53,19 @@ async def open_session(
 router.include_router(_opening)
 
 
+def _start(body: SessionRequest, limits: ServiceSettings) -> tuple[Scene | Past, LightSettings]:
+    """What is asked for, within the limits."""
+    if sum(given is not None for given in (body.scene, body.sample, body.snapshot)) != 1:
+        told = "give one of these: a scene, the name of a sample, or a snapshot"
+        raise ProblemError.of_field(INVALID, ["body", "scene"], told)
+    if body.snapshot is not None:
+        return accepted(body.snapshot, limits, ["body", "snapshot"], body.settings)
+    settings = body.settings.changes_to(limits.solver_defaults)
+    limits.check_solver(settings)
+    return _scene(body, limits.scene_limits), settings
+
+
 def _scene(body: SessionRequest, limits: SceneLimits) -> Scene:
-    if (body.scene is None) == (body.sample is None):
-        raise ProblemError.of_field(INVALID, ["body", "scene"], "give either a scene or the name of a sample")
     try:
         if body.sample is not None:
             return load_sample(body.sample)
