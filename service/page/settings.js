@@ -38,6 +38,7 @@ export class SettingsPanel {
   /** Ask for frames that are otherwise. */
   take(settings) {
     Object.assign(this.#view.settings, settings);
+    if (settings.renderer) this.#find("caption").textContent = `${settings.renderer}: the first frame is on its way…`;
     this.#show();
     this.#view.changed();
   }

@@ -22,7 +22,7 @@ from service.negotiation import MEDIA_TYPES
 from service.problems import INVALID, ProblemError
 from service.streaming.incoming import SOURCE, CameraMessage
 from service.streaming.outgoing import ErrorMessage, FrameHeader, Outbox
-from service.streaming.pacing import Pace, Quality
+from service.streaming.pacing import LADDER, Pace, Quality
 from solver.engine.requests import RendererName, Wait, WaitFor
 
 MOST_UNACKNOWLEDGED: Final = 2
@@ -42,8 +42,14 @@ _PATIENCE: Final = 30.0
 
 _NOW: Final = Wait()
 
-_NOT_YET: Final = (RendererName.PATH, RendererName.VPL)
-"""What has nothing to show before its first light is there; others show the solution as it stands."""
+_PREVIEW: Final = 3.0
+"""Seconds that a coarse frame may take which is shown before a full one"""
+
+_SLOW: Final = (RendererName.PATH, RendererName.GATHER)
+"""What takes seconds for a full frame, and has a coarse one before"""
+
+_NOT_YET: Final = (RendererName.PATH, RendererName.VPL, RendererName.GATHER)
+"""What has nothing to show before every pixel has light; others show the solution as it stands."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +169,8 @@ class Feed:
         if self._pace.is_moving(time.monotonic()):
             return _Ask(self._view, Quality.MOVING, _NOW, _MOVING_WAIT, since) if is_new else None
         if shown is None or is_new:
+            if self._camera.renderer in _SLOW:
+                return _Ask(self._view, Quality.MOVING, _NOW, _PREVIEW, since)
             return _Ask(self._view, Quality.REST, since=since)
         if shown.quality is Quality.MOVING:
             return _Ask(self._view, Quality.REST)
@@ -200,6 +208,8 @@ class Feed:
             return
         is_worth = answer.outlook.drawable or answer.outlook.renderer not in _NOT_YET
         self._shown = _Shown(ask.view, ask.quality, answer, is_worth, standing)
+        if ask.quality is Quality.MOVING and not is_worth:
+            self._pace.took(ask.timeout)
         if answer.content is not None and is_worth:
             await self._send(camera, ask, answer, answer.content, time.monotonic() - start)
 
@@ -207,7 +217,7 @@ class Feed:
         frame = camera.frame
         presentation = Presentation(scale_maximum=camera.lux)
         if ask.quality is Quality.MOVING:
-            coarse = self._pace.coarseness
+            coarse = LADDER[-1] if frame.renderer is RendererName.PATH else self._pace.coarseness
             presentation = replace(presentation, scale=coarse.scale, quality=coarse.quality)
             if frame.renderer is RendererName.GATHER:
                 frame = replace(frame, renderer=RendererName.INTERPOLANT)
@@ -216,7 +226,7 @@ class Feed:
         return GetFrame(frame, camera.encoding, ask.wait, ask.timeout, frozenset(known), presentation)
 
     async def _fetch(self, request: GetFrame, ask: _Ask, revision: int) -> FrameAnswer | None:
-        """The answer; None where, at rest, the view changed before it came."""
+        """The answer; None where the view changed before it came, and it might take long."""
         fetching = asyncio.create_task(self._worker.call(request))
         try:
             while True:
@@ -227,7 +237,7 @@ class Feed:
                     return fetching.result()
                 self._stir.clear()
                 is_stale = (self._view, self._revision) != (ask.view, revision)
-                if is_stale and ask.quality is Quality.REST:
+                if is_stale and ask.timeout > _MOVING_WAIT:
                     return None
         finally:
             fetching.cancel()
