@@ -16,6 +16,7 @@ from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Sessions
 from service.journal.journal import Journal
 from service.json_body import BodyLimit
+from service.logs import RequestLog
 from service.metrics import Metrics, RequestMetrics
 from service.openapi import describe, version
 from service.routes import (
@@ -53,6 +54,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
         version=version(),
         lifespan=_life,
         middleware=[
+            Middleware(RequestLog),
             Middleware(RequestMetrics, metrics=metrics),
             Middleware(BodyLimit, max_bytes=chosen.max_body_bytes),
         ],

@@ -11,6 +11,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.hosting.lasting import Terms
 from service.hosting.sessions import Quotas
+from service.logs import LogStyle
 from solver.document.limits import SceneLimits
 from solver.engine.requests import FrameLimits
 from solver.errors import LimitExceededError
@@ -51,6 +52,10 @@ class ServiceSettings(BaseSettings):
         default=None,
         description="Directory in which sessions are kept, so that they outlast the service. No two services "
         "may share one. Without, they outlast their workers alone.",
+    )
+    log: LogStyle = Field(
+        default=LogStyle.QUIET,
+        description="What is logged: `quiet`, warnings alone; `text` or `json`, each request too.",
     )
     pool_size: int = Field(default=2, ge=0, le=64, description="Workers kept warm for the next sessions.")
     refill_delay: float = Field(

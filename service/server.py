@@ -11,6 +11,7 @@ from typing import Final
 import uvicorn
 from fastapi import FastAPI
 
+from service import logs
 from service.app import create_app
 from service.config import ServiceSettings
 from service.context import Context
@@ -67,6 +68,7 @@ def serve(settings: ServiceSettings | None = None) -> None:
     JournalError where sessions cannot be kept.
     """
     chosen = settings or ServiceSettings()
+    logs.configure(chosen.log)
     with _listen(chosen.host, chosen.port) as listening:
         server = Server(create_app(chosen), _address(listening))
         # Having shut down, uvicorn raises the signal again: an interrupt arrives here as this exception.

@@ -188,14 +188,24 @@ class Processes:
         start = time.monotonic()
         await self.put_away()
         opening = await self._load()
-        process = await self._take()
+        process = await self._opened(opening)
+        self.attach(process)
+        self._metrics.wakings.observe(time.monotonic() - start)
+        return process
+
+    async def _opened(self, opening: Open) -> RemoteWorker:
+        """A process that holds what `opening` tells; another one, where one ends before it does."""
+        for _ in range(_CHANCES - 1):
+            with contextlib.suppress(WorkerGoneError):
+                return await self._open_in(await self._take(), opening)
+        return await self._open_in(await self._take(), opening)
+
+    async def _open_in(self, process: RemoteWorker, opening: Open) -> RemoteWorker:
         try:
             await process.call(opening)
         except BaseException:
             await process.close()
             raise
-        self.attach(process)
-        self._metrics.wakings.observe(time.monotonic() - start)
         return process
 
     def _tell_failure(self, waking: asyncio.Task[RemoteWorker]) -> None:
