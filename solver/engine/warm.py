@@ -191,8 +191,9 @@ def _draw(drawing: Drawing) -> None:
     # What was seen before an edit is taken over.
     engine.apply([_MOVE])
     _run(engine)
-    engine.outlook(FrameRequest(CameraChoice(), RendererName.INTERPOLANT))
-    _run(engine)
+    for renderer in (RendererName.INTERPOLANT, RendererName.VPL):
+        engine.outlook(FrameRequest(CameraChoice(), renderer))
+        _run(engine)
 
 
 def _reflect(drawing: Drawing) -> None:
