@@ -74,6 +74,7 @@ def serve(**given: object) -> None:
     """Serve scenes over HTTP, until interrupted.
 
     The address is printed when the service is ready. Only this machine reaches the default address; where
-    another is chosen, set HALFLIGHT_TOKEN in the environment, which clients then send as a bearer token.
+    another is chosen, set HALFLIGHT_TOKEN in the environment, which clients then send as a bearer token, or
+    HALFLIGHT_TOKENS for several, by comma, each of which opens the sessions alone that it has made.
     """
     run(settings_of({name: value for name, value in given.items() if value is not None}))
