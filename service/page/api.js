@@ -44,9 +44,9 @@ export async function send(method, path, body) {
 }
 
 export const scenes = async () => (await getJson("/v1/scenes")).scenes;
-export const statusOf = (id) => getJson(`/v1/sessions/${id}`);
-export const sceneOf = (id) => getJson(`/v1/sessions/${id}/scene`);
-export const logOf = (id) => getJson(`/v1/sessions/${id}/log`);
+export const statusOf = (id, options) => getJson(`/v1/sessions/${id}`, {}, options);
+export const sceneOf = (id, options) => getJson(`/v1/sessions/${id}/scene`, {}, options);
+export const logOf = (id, options) => getJson(`/v1/sessions/${id}/log`, {}, options);
 export const configure = (id, settings) => send("PATCH", `/v1/sessions/${id}/settings`, settings);
 export const pick = (id, camera, x, y) => getJson(`/v1/sessions/${id}/pick`, { ...camera.query, x, y });
 

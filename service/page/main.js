@@ -30,14 +30,23 @@ let sample = "cornell";
 
 // --- sessions ---
 
+let beginnings = 0;
+
+/** Open a session, and leave the one before: if it cannot be had, that stays. */
 async function begin(opening) {
-  leave();
-  find("placeholder").hidden = false;
+  beginnings += 1;
+  const number = beginnings;
   clearProblem();
   try {
-    await join(await opening(), null);
+    const status = await opening();
+    if (number !== beginnings) {
+      api.end(status.id); // something else was chosen meanwhile
+      return;
+    }
+    leave();
+    await join(status, null);
   } catch (error) {
-    fail(error);
+    if (number === beginnings) fail(error);
   }
 }
 
@@ -45,6 +54,7 @@ async function begin(opening) {
 function leave() {
   if (!session) return;
   session.close();
+  overlays.attach(null);
   if (session.isOwn && !session.wasShared) api.end(session.id);
   session = null;
   overlays.picked = null;
@@ -122,12 +132,13 @@ function clearProblem() {
 }
 
 function fail(error) {
+  if (error.name === "AbortError") return;
   find("placeholder").textContent = "No session.";
   if (error.status === 401) {
     find("guard").hidden = false;
     find("token").focus();
   } else {
-    complain(error.status === 404 ? "This session is gone." : error.message, true);
+    complain(error.status === 404 ? "This session is gone." : error.message, !session || error.status === 404);
   }
 }
 

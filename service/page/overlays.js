@@ -54,11 +54,14 @@ export class Overlays extends EventTarget {
     view.addEventListener("moved", () => this.#abandon());
   }
 
+  /** Show what a session holds; null: of none. */
   attach(session) {
+    this.#abandon();
     this.#session = session;
     this.picked = null;
     this.#depth = null;
     for (const overlay of this.#shown.values()) Object.assign(overlay, { key: "", figures: [], facts: null });
+    if (!session) return;
     let { revision } = session.status;
     session.addEventListener("status", () => {
       if (session.status.revision !== revision) this.#abandon();
@@ -127,11 +130,11 @@ export class Overlays extends EventTarget {
 
   /** Whether there may be something to show: most overlays are of a solution at rest. */
   #canBeHad(name) {
-    return this.#session.status.state !== "solving" || AT_ONCE.includes(name);
+    return this.#session !== null && (this.#session.status.state !== "solving" || AT_ONCE.includes(name));
   }
 
   #isStale() {
-    if (!this.#view.isAtRest) return false;
+    if (!this.#session || !this.#view.isAtRest) return false;
     return OVERLAYS.some(({ name, query }) => {
       const overlay = this.#shown.get(name);
       const asked = overlay && this.#canBeHad(name) && query(this.#now);
@@ -140,7 +143,7 @@ export class Overlays extends EventTarget {
   }
 
   async #fetchAll() {
-    if (!this.#view.isAtRest || this.#session.isDragging) return;
+    if (!this.#session || !this.#view.isAtRest || this.#session.isDragging) return;
     const session = this.#session;
     await this.#fetchDepth(session);
     for (const { name, query } of OVERLAYS) {
@@ -180,7 +183,7 @@ export class Overlays extends EventTarget {
     const camera = this.#view.camera.copy();
     const { revision } = session.status;
     if (this.#depth?.isOf(camera) && this.#depth.revision === revision) return;
-    this.#depth = await Depth.of(session.id, camera);
+    this.#depth = await Depth.of(session.id, camera, { signal: this.#waiting.signal });
     this.#depth.revision = revision;
   }
 

@@ -13,11 +13,11 @@ export class Depth {
     Object.assign(this, { values, width, height, camera });
   }
 
-  static async of(session, camera) {
+  static async of(session, camera, options) {
     const width = Math.max(1, Math.round(camera.width / 2));
     const height = Math.max(1, Math.round(camera.height / 2));
     const query = { ...camera.query, width, height, layer: "depth", format: "npy" };
-    const buffer = await (await get(`/v1/sessions/${session}/frame`, query)).arrayBuffer();
+    const buffer = await (await get(`/v1/sessions/${session}/frame`, query, options)).arrayBuffer();
     const start = 10 + new DataView(buffer).getUint16(8, true); // npy 1.0: magic, version, length of the header
     const all = new Float32Array(buffer.slice(start));
     return new Depth(Float32Array.from({ length: width * height }, (_, k) => all[3 * k]), width, height, camera);

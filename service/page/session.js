@@ -15,6 +15,7 @@ export class Session extends EventTarget {
   #past = [];
   #future = [];
   #deeds = Promise.resolve();
+  #closed = new AbortController();
 
   constructor(status) {
     super();
@@ -38,9 +39,15 @@ export class Session extends EventTarget {
     this.#lookAtLog();
   }
 
+  /** Leave the session; what is still being fetched of it is given up. */
   close() {
+    this.#closed.abort();
     clearTimeout(this.#log.timer);
     this.stream?.close();
+  }
+
+  get #unlessClosed() {
+    return { signal: this.#closed.signal };
   }
 
   get objects() {
@@ -125,7 +132,7 @@ export class Session extends EventTarget {
     if (!force && this.scene && this.#sceneRevision === this.status.revision) return;
     this.#fetching = true;
     try {
-      const { revision, scene } = await sceneOf(this.id);
+      const { revision, scene } = await sceneOf(this.id, this.#unlessClosed);
       this.#sceneRevision = revision;
       if (this.isDragging) return;
       this.scene = { cameras: {}, objects: [], ...scene };
@@ -149,12 +156,13 @@ export class Session extends EventTarget {
     log.again = false;
     clearTimeout(log.timer);
     try {
-      this.log = (await logOf(this.id)).entries;
+      this.log = (await logOf(this.id, this.#unlessClosed)).entries;
       this.#tell("log");
     } catch {
       // It is looked at again when the status changes.
     }
     log.looking = false;
+    if (this.#closed.signal.aborted) return;
     if (log.again || this.log.some(({ state }) => state !== "settled")) {
       log.timer = setTimeout(() => this.#lookAtLog(), LOG_INTERVAL);
     }
@@ -163,7 +171,7 @@ export class Session extends EventTarget {
   /** Look at everything anew, after the connection was away. */
   async refresh() {
     try {
-      this.#take(await statusOf(this.id));
+      this.#take(await statusOf(this.id, this.#unlessClosed));
       await this.#loadScene(true);
       this.#lookAtLog();
     } catch (error) {
@@ -172,6 +180,7 @@ export class Session extends EventTarget {
   }
 
   #tell(name, detail = null) {
+    if (this.#closed.signal.aborted) return;
     this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 }

@@ -20,6 +20,7 @@ export class Stream extends EventTarget {
   #refusals = 0;
   #timer = 0;
   #closed = false;
+  #given = new AbortController(); // up, when it is closed
   #header = null;
   #number = 0;
   #answers = new Map();
@@ -67,6 +68,7 @@ export class Stream extends EventTarget {
 
   close() {
     this.#closed = true;
+    this.#given.abort();
     clearInterval(this.#heartbeat);
     clearTimeout(this.#timer);
     this.#socket?.close();
@@ -132,7 +134,7 @@ export class Stream extends EventTarget {
   // A WebSocket that fails does not say why: a plain request does.
   async #reconnect() {
     try {
-      await statusOf(this.#session);
+      await statusOf(this.#session, { signal: this.#given.signal });
     } catch (error) {
       if (this.#closed) return;
       this.#refusals = error.status === 503 ? this.#refusals + 1 : 0;

@@ -132,4 +132,4 @@ def viewing(
         yield viewer
         if may_be_lost:
             viewer.complaints = [text for text in viewer.complaints if not LOST.search(text)]
-        assert viewer.complaints == []
+        assert not viewer.complaints, viewer.complaints
