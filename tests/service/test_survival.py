@@ -165,6 +165,7 @@ class Editor(threading.Thread):
         assert {what: found[what] for what in expected} == expected
 
 
+@pytest.mark.slow
 def test_no_acknowledged_edit_is_lost_under_load(directory: Path) -> None:
     chance = random.Random(7)
     with keeping(directory) as service:
