@@ -138,6 +138,7 @@ OVERLAYS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_overlays_and_false_colours_show(viewer: Viewer) -> None:
     viewer.open()
     viewer.settle()
@@ -159,6 +160,7 @@ def test_overlays_and_false_colours_show(viewer: Viewer) -> None:
     viewer.keep("false-colour")
 
 
+@pytest.mark.slow
 def test_a_file_is_opened_and_bad_ones_say_what_is_wrong(viewer: Viewer, tmp_path: Path) -> None:
     viewer.open()
     page = viewer.page
@@ -175,6 +177,7 @@ def test_a_file_is_opened_and_bad_ones_say_what_is_wrong(viewer: Viewer, tmp_pat
     expect(page.locator("#problem")).to_contain_text("bad.json")
 
 
+@pytest.mark.slow
 def test_it_reads_well_on_a_phone_and_in_the_dark(browser: Browser, service: Service) -> None:
     with viewing(browser, f"{service.http.base_url}/", (390, 844), "dark") as viewer:
         viewer.open()
@@ -220,6 +223,7 @@ def test_keys_reach_everything(viewer: Viewer) -> None:
     expect(page.locator("#help")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_a_session_that_is_gone_is_told_and_opened_anew(browser: Browser, service: Service) -> None:
     with viewing(browser, f"{service.http.base_url}/", may_be_lost=True) as viewer:
         viewer.open()
@@ -234,6 +238,7 @@ def test_a_session_that_is_gone_is_told_and_opened_anew(browser: Browser, servic
         assert session_of(viewer) != path
 
 
+@pytest.mark.slow
 def test_it_comes_back_when_the_service_does(browser: Browser, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = str(free.getsockname()[1])
