@@ -25,6 +25,7 @@ def address() -> Iterator[str]:
         yield str(service.http.base_url)
 
 
+@pytest.mark.slow
 def test_the_tour_of_the_documentation_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     snippets = re.findall(r"```python\n(.*?)```", TOUR.read_text(), re.DOTALL)
     assert len(snippets) > 5

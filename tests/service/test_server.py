@@ -150,6 +150,7 @@ def test_a_listener_that_comes_late_gets_the_status_at_once(service: Service) ->
     assert service.http.delete(path).status_code == 204
 
 
+@pytest.mark.slow
 def test_sessions_are_solved_side_by_side(service: Service) -> None:
     answers: dict[int, httpx.Response] = {}
 

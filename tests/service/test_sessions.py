@@ -195,6 +195,7 @@ def eventually(holds: Callable[[], bool]) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_an_idle_session_sleeps_until_it_is_needed() -> None:
     with service(pool_size=2, refill_delay=0.0, idle_seconds=0.4) as client:
         path = open_box(client)
@@ -232,6 +233,7 @@ def test_a_session_that_nobody_wants_expires() -> None:
         assert eventually(lambda: not is_running(pid))
 
 
+@pytest.mark.slow
 def test_who_dozes_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sessions, "_DOZING", 0.0)
     with service(pool_size=2, refill_delay=0.0, max_sessions=1, max_kept_sessions=2) as client:
@@ -246,6 +248,7 @@ def test_who_dozes_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
             assert client.delete(path).status_code == 204
 
 
+@pytest.mark.slow
 def test_a_used_session_does_not_expire() -> None:
     with service(pool_size=1, refill_delay=60.0, idle_seconds=0.4) as client:
         path = open_box(client, error_tolerance=1e-6, max_elements=20)

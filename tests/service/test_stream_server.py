@@ -108,6 +108,7 @@ def test_what_is_too_big_or_to_no_session_is_refused(service: Service) -> None:
     assert service.http.delete(path).status_code == 204
 
 
+@pytest.mark.slow
 def test_the_end_of_the_service_ends_streams_at_once() -> None:
     with running() as service:
         path = service.open(ENDLESS)

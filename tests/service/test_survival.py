@@ -68,6 +68,7 @@ def lead_a_life(service: Service) -> str:
     return path
 
 
+@pytest.mark.slow
 def test_all_of_it_is_there_after_a_kill_of_the_worker_and_of_the_service(directory: Path) -> None:
     with keeping(directory) as service:
         (warm,) = service.workers()
@@ -106,6 +107,7 @@ def test_all_of_it_is_there_after_a_kill_of_the_worker_and_of_the_service(direct
         assert service.http.get("/v1/sessions").json() == {"sessions": []}
 
 
+@pytest.mark.slow
 def test_two_services_do_not_share_a_directory(directory: Path) -> None:
     with keeping(directory):
         second = subprocess.run(
