@@ -113,9 +113,7 @@ def _repaint(before: TransportState, after: TransportState, match: Match) -> Non
     changed[now] = np.any(old.emission[stays] != new.emission[now], axis=1)
     changed[now] |= np.any(old.reflectance[stays] != new.reflectance[now], axis=1)
     rows = np.flatnonzero(changed[after.tree.patch])
-    patch = after.tree.patch[rows]
-    after.radiosity[rows] = after.reflectance[patch][:, None] * after.received[rows]
-    after.radiosity[rows, 0] += after.emission[patch]
+    after.radiosity[rows] = after.answering()[rows]
 
 
 def _in_channels(state: TransportState, values: FloatArray, channels: int) -> FloatArray:

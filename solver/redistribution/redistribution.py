@@ -5,8 +5,8 @@ delta F shoots delta F times the radiosity that its ends have shot: positive ene
 that was hidden, negative where a shadow falls ([G eq. 5]). What arrives is unshot, and is propagated by the
 solve as ever ([G eq. 6]). A solution that had not converged has shot less, and so has less to redistribute.
 
-An edit finds out which links it has touched, and owes them a new look; debts are paid in the order of the
-energy at stake. Another edit may interrupt at any time: it takes over what is still owed.
+An edit finds out which links it has touched, and owes them a new look; debts are paid in the order of what
+they can add to the squared error. Another edit may interrupt at any time: it takes over what is still owed.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from solver.transport.estimate import Residuals
 from solver.transport.field import RadiosityField
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
+from solver.transport.pace import steps
 from solver.transport.pushpull import gather, means
 from solver.transport.refine import NOISE_SHARE, Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
@@ -226,13 +227,12 @@ class Redistribution(RadiositySolver):
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
         if new > self.settings.error_tolerance and plan.left[0] > 0.0:
             # So much has changed that refinement would look at the wrong light.
+            self._find_closed()
             yield from self._settle(_ROUGHLY * new)
             self.version += 1
             yield True
         else:
-            patch = state.tree.patch
-            state.radiosity = state.reflectance[patch][:, None] * state.received
-            state.radiosity[:, 0] += state.emission[patch]
+            state.radiosity = state.answering()
         self._faded = np.concatenate([self._faded, *faded])
         self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
         yield from self._refine_as_before()
@@ -249,17 +249,9 @@ class Redistribution(RadiositySolver):
     def _propagate(self) -> Generator[bool, None, FloatArray]:
         """Shoot all that has arrived. Returns the moments of what elements send from now on."""
         state = self._state
-        patch = state.tree.patch
-        radiosity = state.reflectance[patch][:, None] * state.received
-        radiosity[:, 0] += state.emission[patch]
-        work = state.gather_in_steps(radiosity - state.radiosity)
-        while True:
-            try:
-                next(work)
-            except StopIteration as end:
-                state.received += end.value
-                break
-            yield True
+        radiosity = state.answering()
+        arrived = yield from steps(state.gather_in_steps(radiosity - state.radiosity))
+        state.received += arrived
         state.radiosity = radiosity
         self.version += 1
         return moments_of(state)
@@ -277,14 +269,7 @@ class Redistribution(RadiositySolver):
             merging = merging[:0]
         if full:
             rows = merging = np.arange(len(state.links), dtype=np.int32)
-        work = coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound)
-        while True:
-            try:
-                next(work)
-            except StopIteration as end:
-                rows = end.value
-                break
-            yield True
+        rows = yield from steps(coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound))
         if full:
             self.lean = len(state.links)
         while True:
@@ -304,7 +289,7 @@ class Redistribution(RadiositySolver):
             yield True
 
     def _make_plan(self) -> _Plan:
-        """All debts in the order of the energy at stake; `_unlinked` gets into that order too."""
+        """All debts, the most urgent first; `_unlinked` gets into that order too."""
         state, pairs = self._state, self._unlinked
         links, tree = state.links, state.tree
         rows = np.flatnonzero(links.debt).astype(np.int32)

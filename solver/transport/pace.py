@@ -53,6 +53,17 @@ class Pace:
             first = last
 
 
+def steps(work: Generator[object, None, R]) -> Generator[bool, None, R]:
+    """The same work, which yields True at every step."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: R = end.value
+            return result
+        yield True
+
+
 def finish(work: Generator[object, None, R]) -> R:
     """What `work` comes to, in one go."""
     while True:

@@ -101,7 +101,7 @@ class RadiositySolver(SlicedSolve):
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
         self.pace = Pace()
         self._state = TransportState.of(surfaces)
-        self._closed = False
+        self._closed: bool | None = None
         self._ray_count = 0
         self._rounds = 0
         self._handed: TransportState | None = None
@@ -156,7 +156,7 @@ class RadiositySolver(SlicedSolve):
             links_partial=int(kinds[PARTIAL]),
             links_none=int(kinds[NONE]),
             channels=state.channels,
-            closed=self._closed,
+            closed=bool(self._closed),
             rays=self._ray_count,
             rounds=self._rounds,
             gathers=state.gathers,
@@ -224,11 +224,16 @@ class RadiositySolver(SlicedSolve):
         """Bring about links between all patches that exchange light; sets `outcome` where that fails."""
         yield from self._link_patches()
 
+    def _find_closed(self) -> None:
+        """Find out whether the scene is closed, once."""
+        if self._closed is None:
+            self._closed = is_closed(self.surfaces, self._rays)
+
     def _run(self) -> Iterator[bool]:
         yield from self._open()
         if self.outcome is not SolveOutcome.RUNNING:
             return
-        self._closed = is_closed(self.surfaces, self._rays)
+        self._find_closed()
         yield True
         tolerance = self.settings.error_tolerance
         state = self._state
@@ -281,7 +286,7 @@ class RadiositySolver(SlicedSolve):
             yield True
 
     def _settle(self, target: float, strict: bool = False) -> Generator[bool, None, bool]:
-        for _ in balance(self._state, self._closed, strict):
+        for _ in balance(self._state, bool(self._closed), strict):
             yield True
         work = settle(self._state, target)
         while True:

@@ -88,6 +88,13 @@ class TransportState:
         push(self.tree.parent, self.tree.offset, arrived)
         self.received += (factor * self.closure)[:, None, None] * arrived
 
+    def answering(self) -> FloatArray:
+        """Radiosity functions (n, 3, channels) that answer what has been received; of leaves alone right."""
+        patch = self.tree.patch
+        radiosity: FloatArray = self.reflectance[patch][:, None] * self.received
+        radiosity[:, 0] += self.emission[patch]
+        return radiosity
+
     def split(self, ids: IntArray) -> None:
         """Subdivide leaves; the children start with their parent's light."""
         before = len(self.tree)
