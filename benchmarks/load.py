@@ -13,11 +13,9 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import re
 import signal
 import statistics
 import subprocess
-import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -28,6 +26,8 @@ from typing import Annotated, Any, Final, TypeVar
 
 import httpx
 import typer
+
+from benchmarks.served import served
 
 T = TypeVar("T")
 
@@ -153,27 +153,14 @@ async def load(sessions: int, seconds: float, kill: float | None, directory: Pat
 async def _service(
     sessions: int, directory: Path | None
 ) -> AsyncIterator[tuple[httpx.AsyncClient, subprocess.Popen[str]]]:
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("HALFLIGHT_")}
-    environment |= {"HALFLIGHT_MAX_SESSIONS": str(sessions), "HALFLIGHT_WAKE_SECONDS": str(_PATIENCE)}
+    settings = {"MAX_SESSIONS": str(sessions), "WAKE_SECONDS": str(_PATIENCE)}
     if directory is not None:
-        environment["HALFLIGHT_DATA_DIR"] = str(directory)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "halflight", "serve", "--host", "127.0.0.1", "--port", "0"],
-        env=environment,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        address = re.search(r"http://\S+", await asyncio.to_thread(process.stdout.readline))
-        if address is None:
-            raise RuntimeError("the service did not start")
-        limits = httpx.Limits(max_connections=2 * sessions)
-        async with httpx.AsyncClient(base_url=address[0], timeout=_PATIENCE, limits=limits) as http:
+        settings["DATA_DIR"] = str(directory)
+    limits = httpx.Limits(max_connections=2 * sessions)
+    # Nothing else runs while the service starts and ends.
+    with served(**settings) as (address, process):
+        async with httpx.AsyncClient(base_url=address, timeout=_PATIENCE, limits=limits) as http:
             yield http, process
-    finally:
-        process.terminate()
-        await asyncio.to_thread(process.communicate)
 
 
 async def _every(seconds: float, act: Callable[[], Any]) -> None:

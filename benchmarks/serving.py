@@ -6,11 +6,8 @@ The service runs as `halflight serve` does, in its own processes, with a client 
 from __future__ import annotations
 
 import json
-import os
 import re
 import statistics
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +18,7 @@ from typing import Any, Final
 import httpx
 
 from benchmarks.plan import Job, Options, Section
+from benchmarks.served import served
 from benchmarks.tables import Row, Table, Target
 
 SCENE: Final = "cornell"
@@ -151,24 +149,8 @@ def _wait_for_pool(client: httpx.Client) -> None:
 @contextmanager
 def _service() -> Iterator[httpx.Client]:
     """A service on a free port, with the settings that it has by default."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("HALFLIGHT_")}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "halflight", "serve", "--host", "127.0.0.1", "--port", "0"],
-        env=environment,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        told = process.stdout.readline()
-        address = re.search(r"http://\S+", told)
-        if address is None:
-            raise RuntimeError(f"the service did not start: {told.strip() or 'it told nothing'}")
-        with httpx.Client(base_url=address[0], timeout=_PATIENCE) as client:
-            yield client
-    finally:
-        process.terminate()
-        process.communicate()
+    with served() as (address, _), httpx.Client(base_url=address, timeout=_PATIENCE) as client:
+        yield client
 
 
 def section(options: Options) -> Section:
