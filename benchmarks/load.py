@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import os
 import random
+import re
 import signal
 import statistics
 import subprocess
@@ -34,7 +35,6 @@ T = TypeVar("T")
 _SCENES: Final = ("cornell", "cube_room")
 _SIZE: Final[dict[str, str | int]] = {"width": 320, "height": 240, "format": "jpeg"}
 _PATIENCE: Final = 120.0
-_PAGE: Final = os.sysconf("SC_PAGE_SIZE")
 
 
 @dataclass
@@ -45,7 +45,7 @@ class Tally:
     """Of each kind of request that succeeded"""
     failures: Counter[str] = field(default_factory=Counter)
     memory: list[float] = field(default_factory=list)
-    """MB of all processes, every second"""
+    """MB of all processes together, every second"""
     kills: int = 0
 
     def table(self) -> str:
@@ -170,7 +170,7 @@ async def _every(seconds: float, act: Callable[[], Any]) -> None:
 
 
 def _kill(service: int, tally: Tally, chance: random.Random) -> None:
-    workers = _children(service)
+    workers = _workers(service)
     if workers:
         os.kill(chance.choice(workers), signal.SIGKILL)
         tally.kills += 1
@@ -181,15 +181,21 @@ def _children(process: int) -> list[int]:
     return sorted(int(child) for file in listed for child in file.read_text().split())
 
 
-def _memory(process: int) -> float:
-    """MB of a process and its children."""
-    total = 0
-    for pid in (process, *_children(process)):
+def _workers(service: int) -> list[int]:
+    """They are forked from a process that is the service's only child."""
+    return [worker for nursery in _children(service) for worker in _children(nursery)]
+
+
+def _memory(service: int) -> float:
+    """MB of a service's processes; what they share is counted once."""
+    kilobytes = 0
+    for pid in (service, *_children(service), *_workers(service)):
         try:
-            total += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+            told = Path(f"/proc/{pid}/smaps_rollup").read_text()
         except (FileNotFoundError, ProcessLookupError):
             continue
-    return total * _PAGE / 1e6
+        kilobytes += sum(int(found) for found in re.findall(r"^Pss:\s+(\d+) kB", told, re.MULTILINE))
+    return kilobytes * 1.024e-3
 
 
 def main(

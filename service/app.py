@@ -12,6 +12,7 @@ from starlette.middleware import Middleware
 from service import problems
 from service.config import ServiceSettings
 from service.context import Context, require_token
+from service.hosting.nursery import Nursery
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Sessions
 from service.journal.journal import Journal
@@ -38,11 +39,13 @@ from service.routes import sessions as session_routes
 from service.session_metrics import SessionMetrics
 
 
-def create_app(settings: ServiceSettings | None = None) -> FastAPI:
-    """A new application. Its workers start and end with its lifespan."""
+def create_app(settings: ServiceSettings | None = None, nursery: Nursery | None = None) -> FastAPI:
+    """A new application. Its workers start and end with its lifespan, and so does the nursery that they
+    come from, unless one is given, which apps may share."""
     chosen = settings or ServiceSettings()
     metrics = Metrics()
-    pool = WorkerPool(chosen.pool_size, chosen.refill_delay, metrics.workers_lost.inc)
+    source = nursery or Nursery()
+    pool = WorkerPool(source, chosen.pool_size, metrics.workers_lost.inc)
     lives = SessionMetrics(metrics.registry)
     journal = Journal(chosen.data_dir, lives.commits.observe)
     sessions = Sessions(pool, journal, chosen.quotas, chosen.terms, lives)
@@ -60,7 +63,7 @@ def create_app(settings: ServiceSettings | None = None) -> FastAPI:
         ],
         redoc_url=None,
     )
-    app.state.context = Context(chosen, pool, journal, sessions, metrics)
+    app.state.context = Context(chosen, pool, journal, sessions, metrics, None if nursery else source)
     problems.install(app)
     app.include_router(pages.router)
     for routes in (

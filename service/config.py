@@ -57,12 +57,7 @@ class ServiceSettings(BaseSettings):
         default=LogStyle.QUIET,
         description="What is logged: `quiet`, warnings alone; `text` or `json`, each request too.",
     )
-    pool_size: int = Field(default=2, ge=0, le=64, description="Workers kept warm for the next sessions.")
-    refill_delay: float = Field(
-        default=1.0,
-        ge=0.0,
-        description="Seconds that a new session has the cores to itself before the pool refills.",
-    )
+    pool_size: int = Field(default=2, ge=0, le=64, description="Workers kept ready for the next sessions.")
     idle_seconds: float = Field(
         default=1800.0,
         gt=0.0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias, cast
@@ -10,6 +11,7 @@ from fastapi import Depends, Path, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from service.config import ServiceSettings
+from service.hosting.nursery import Nursery
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Session, Sessions
 from service.journal.journal import Journal
@@ -26,6 +28,8 @@ class Context:
     journal: Journal
     sessions: Sessions
     metrics: Metrics
+    nursery: Nursery | None = None
+    """That workers come from, where it is of this app alone"""
 
     async def begin(self) -> None:
         """Have a worker warm, and all sessions that are kept; nothing where that is so.
@@ -41,6 +45,8 @@ class Context:
         await self.sessions.close()
         await self.pool.close()
         await self.journal.close()
+        if self.nursery is not None:
+            await asyncio.to_thread(self.nursery.close)
 
 
 def context_of(request: Request) -> Context:

@@ -15,6 +15,7 @@ from service import logs
 from service.app import create_app
 from service.config import ServiceSettings
 from service.context import Context
+from service.hosting.nursery import Nursery
 
 _GRACE: Final = 5
 """Seconds that requests are given to end when the server does."""
@@ -69,11 +70,16 @@ def serve(settings: ServiceSettings | None = None) -> None:
     """
     chosen = settings or ServiceSettings()
     logs.configure(chosen.log)
-    with _listen(chosen.host, chosen.port) as listening:
-        server = Server(create_app(chosen), _address(listening))
-        # Having shut down, uvicorn raises the signal again: an interrupt arrives here as this exception.
-        with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(server.run_on(listening))
+    nursery = Nursery()
+    nursery.fork()  # before there are threads or sockets
+    try:
+        with _listen(chosen.host, chosen.port) as listening:
+            server = Server(create_app(chosen, nursery), _address(listening))
+            # Having shut down, uvicorn raises the signal again: an interrupt arrives here as this exception.
+            with contextlib.suppress(KeyboardInterrupt):
+                asyncio.run(server.run_on(listening))
+    finally:
+        nursery.close()
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -1,4 +1,4 @@
-"""Warm workers in stock, so that a session need not wait for imports, kernels and a GL context."""
+"""Workers in stock, so that a session need not even wait for a fork and a GL context."""
 
 from __future__ import annotations
 
@@ -7,70 +7,84 @@ import logging
 from collections import deque
 from collections.abc import Callable
 
+from service.hosting.nursery import Nursery
 from service.hosting.remote import RemoteWorker, WorkerNotStartedError
 
 _log = logging.getLogger(__name__)
 
 
 class WorkerPool:
-    """A few workers that hold no session yet."""
+    """A few workers that hold no session yet, ready or about to be."""
 
-    def __init__(self, size: int, refill_delay: float, on_lost: Callable[[], None]) -> None:
-        """Keep `size` workers; refill `refill_delay` seconds after one was taken, so as not to take the
-        cores from the session that took it. `on_lost` is called for each that ends unexpectedly."""
+    def __init__(self, nursery: Nursery, size: int, on_lost: Callable[[], None]) -> None:
+        """Keep `size` workers of `nursery`. `on_lost` is called for each that ends unexpectedly."""
+        self._nursery = nursery
         self._size = size
         self._on_lost = on_lost
-        self._delay = refill_delay
-        self._stock: deque[RemoteWorker] = deque()
-        self._refilling: asyncio.Task[None] | None = None
+        self._stock: deque[asyncio.Future[RemoteWorker]] = deque()
         self._closed = False
 
     @property
     def stock(self) -> int:
         """Workers that wait for a session."""
-        return len(self._stock)
+        return sum(coming.done() and _failure(coming) is None for coming in self._stock)
 
     async def begin(self) -> None:
-        """Start the first worker, and the others in the background. Raises WorkerNotStartedError."""
-        if self._size > 0 and not self._stock:
-            self._stock.append(await RemoteWorker.start(self._on_lost))
-            self._refill_later()
-
-    async def fill(self) -> None:
-        """Start workers until the stock is complete. Raises WorkerNotStartedError."""
-        while len(self._stock) < self._size and not self._closed:
-            self._stock.append(await RemoteWorker.start(self._on_lost))
+        """Start to fill the stock; return with the first worker. Raises WorkerNotStartedError."""
+        self._fill()
+        if self._stock:
+            await asyncio.shield(self._stock[0])
 
     async def take(self) -> RemoteWorker:
-        """A worker, warm from the stock or newly started. Raises WorkerNotStartedError where none starts."""
-        self._refill_later()
+        """The worker that is ready, or will be, first. Raises WorkerNotStartedError where none starts."""
         while self._stock:
-            worker = self._stock.popleft()
+            coming = self._stock.popleft()
+            try:
+                worker = await asyncio.shield(coming)
+            except WorkerNotStartedError:
+                continue
+            except asyncio.CancelledError:
+                self._stock.appendleft(coming)
+                raise
+            self._fill()
             if not worker.gone:
                 return worker
             await worker.close()
-        return await RemoteWorker.start(self._on_lost)
+        worker = await self._start()
+        self._fill()
+        return worker
 
     def give_back(self, worker: RemoteWorker) -> None:
         """Take back a worker that holds no session after all."""
-        self._stock.appendleft(worker)
+        given: asyncio.Future[RemoteWorker] = asyncio.get_running_loop().create_future()
+        given.set_result(worker)
+        self._stock.appendleft(given)
 
     async def close(self) -> None:
         """End all that is in stock."""
         self._closed = True
-        if self._refilling is not None:
-            self._refilling.cancel()
-            await asyncio.gather(self._refilling, return_exceptions=True)
         while self._stock:
-            await self._stock.popleft().close()
+            coming = self._stock.popleft()
+            await asyncio.wait([coming])
+            if _failure(coming) is None:
+                await coming.result().close()
 
-    def _refill_later(self) -> None:
-        if self._size > 0 and (self._refilling is None or self._refilling.done()):
-            self._refilling = asyncio.create_task(self._refill())
+    async def _start(self) -> RemoteWorker:
+        return await RemoteWorker.start(self._nursery, self._on_lost)
 
-    async def _refill(self) -> None:
-        await asyncio.sleep(self._delay)
-        try:
-            await self.fill()
-        except WorkerNotStartedError:
-            _log.error("a worker for the pool did not start")
+    def _fill(self) -> None:
+        """Start as many workers as are missing."""
+        while len(self._stock) < self._size and not self._closed:
+            coming = asyncio.create_task(self._start())
+            coming.add_done_callback(_tell_failure)
+            self._stock.append(coming)
+
+
+def _failure(coming: asyncio.Future[RemoteWorker]) -> BaseException | None:
+    return asyncio.CancelledError() if coming.cancelled() else coming.exception()
+
+
+def _tell_failure(coming: asyncio.Future[RemoteWorker]) -> None:
+    """Whoever takes it is told by itself; where nobody does, this is all that tells it."""
+    if isinstance(_failure(coming), WorkerNotStartedError):
+        _log.error("a worker for the pool did not start")

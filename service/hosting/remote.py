@@ -6,21 +6,17 @@ import asyncio
 import itertools
 import logging
 import socket
-import subprocess
-import sys
 from collections.abc import Callable
-from typing import Final, TypeVar, cast
+from typing import TypeVar, cast
 
 from service.hosting.messages import Abandon, Answer, Call, Ready, Refusal, Request, StatusChanged
+from service.hosting.nursery import DistantProcess, Nursery
 from service.hosting.wire import WebEnd
 from solver.engine.status import EngineStatus
 
 R = TypeVar("R")
 
 _log = logging.getLogger(__name__)
-
-_FAREWELL: Final = 2.0
-"""Seconds in which a worker whose line was hung up must have ended by itself."""
 
 
 class WorkerGoneError(Exception):
@@ -50,7 +46,7 @@ class RefusedError(Exception):
 class RemoteWorker:
     """One worker process, from its start to its end."""
 
-    def __init__(self, process: subprocess.Popen[bytes], end: WebEnd, on_lost: Callable[[], None]) -> None:
+    def __init__(self, process: DistantProcess, end: WebEnd, on_lost: Callable[[], None]) -> None:
         self._process = process
         self._end = end
         self._on_lost = on_lost
@@ -67,14 +63,18 @@ class RemoteWorker:
         """Why it cannot draw frames, if it cannot"""
 
     @classmethod
-    async def start(cls, on_lost: Callable[[], None]) -> RemoteWorker:
-        """Start a process and wait until it is warm. Raises WorkerNotStartedError where it does not.
+    async def start(cls, nursery: Nursery, on_lost: Callable[[], None]) -> RemoteWorker:
+        """Have a process forked, and wait until it is ready. Raises WorkerNotStartedError where it is not.
 
         `on_lost` is called when the process ends without having been closed.
         """
         ours, theirs = socket.socketpair()
-        with theirs:
-            process = await asyncio.to_thread(_spawn, theirs)
+        try:
+            process = await asyncio.to_thread(_born, nursery, theirs)
+        except OSError as error:
+            ours.close()
+            _log.error("a worker could not be started: %s", error)
+            raise WorkerNotStartedError from error
         worker = cls(process, await WebEnd.over(ours), on_lost)
         try:
             ready = await worker._end.receive()
@@ -124,7 +124,7 @@ class RemoteWorker:
         self._end.close()
         if self._reading is not None:
             await self._reading
-        await asyncio.to_thread(_reap, self._process)
+        await asyncio.to_thread(self._process.end)
 
     async def _tell(self, message: Call | Abandon) -> None:
         try:
@@ -161,14 +161,6 @@ class RemoteWorker:
         news.set()
 
 
-def _spawn(theirs: socket.socket) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "service.hosting.worker", str(theirs.fileno())]
-    return subprocess.Popen(command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
-
-
-def _reap(process: subprocess.Popen[bytes]) -> None:
-    try:
-        process.wait(_FAREWELL)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+def _born(nursery: Nursery, theirs: socket.socket) -> DistantProcess:
+    with theirs:
+        return nursery.worker(theirs)

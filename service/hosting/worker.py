@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import os
 import queue
-import signal
 import socket
-import sys
 import threading
 import time
-from typing import Final
+from typing import Final, NoReturn
 
 from service.hosting.answers import REFUSED, answer, refusal_of
 from service.hosting.messages import (
@@ -37,7 +35,6 @@ from service.hosting.wire import WorkerEnd
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.status import EngineStatus
-from solver.engine.warm import warm_up
 
 SLICE: Final = 0.02
 """Seconds of work between two looks at the requests."""
@@ -59,7 +56,7 @@ class Host:
         self._reported: EngineStatus | None = None
         self._report_due = 0.0
 
-    def run(self) -> None:
+    def run(self) -> NoReturn:
         """Serve for ever: the reading thread ends the process."""
         while True:
             for message in self._arrived():
@@ -158,19 +155,11 @@ def _read(end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker]) -> None:
     os._exit(0)
 
 
-def main(descriptor: int) -> None:
-    """Run a worker on the socket of that file descriptor."""
-    # Terminals and supervisors signal all processes; the web process decides what to make of it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+def main(descriptor: int) -> NoReturn:
+    """Be a worker on the socket of that file descriptor, in a process of its own."""
     end = WorkerEnd(socket.socket(fileno=descriptor))
     inbox: queue.SimpleQueue[ToWorker] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(end, inbox), name="halflight-reader", daemon=True).start()
     drawing = Drawing()
-    warm_up(drawing)
     end.send(Ready(drawing.problem))
     Host(end, inbox, drawing).run()
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]))

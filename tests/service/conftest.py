@@ -8,20 +8,22 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.config import ServiceSettings
 from service.context import Context
 from tests.engine.scenes import box_document
+from tests.service.apps import NURSERY, app_client
 
 LOOSE = {"error_tolerance": 0.05}
 
 
+@pytest.fixture(scope="session", autouse=True)
+def nursery() -> Iterator[None]:
+    yield
+    NURSERY.close()
+
+
 @pytest.fixture(scope="session")
 def client() -> Iterator[TestClient]:
-    settings = ServiceSettings(
-        token=None, pool_size=2, refill_delay=0.0, max_sessions=8, max_body_bytes=2**20
-    )
-    with TestClient(create_app(settings)) as client:
+    with app_client(max_sessions=8, max_body_bytes=2**20) as client:
         yield client
 
 

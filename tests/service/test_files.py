@@ -12,8 +12,6 @@ from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from service.app import create_app
-from service.config import ServiceSettings
 from solver.document.samples import load_sample
 from solver.formats.gltf.writer import scene_glb
 from tests.formats.making import binary_stl, ies, square_glb
@@ -21,6 +19,7 @@ from tests.formats.test_archives import packed
 from tests.formats.test_fuzz import SOUND
 from tests.formats.test_mgf import WALL
 from tests.formats.test_obj_and_stl import CUBE, MTL, OBJ
+from tests.service.apps import app_client
 from tests.service.problem import fields_at_fault, problem_of
 
 GLB = "model/gltf-binary"
@@ -142,8 +141,7 @@ def test_limits_count_for_files_too(client: TestClient) -> None:
 
 
 def test_files_need_the_token_before_they_are_read() -> None:
-    guarded = ServiceSettings(token="secret", pool_size=0)
-    with TestClient(create_app(guarded)) as client:
+    with app_client(token="secret", pool_size=0) as client:
         problem_of(post(client, b"nonsense", GLB), 401)
         assert post(client, b"nonsense", GLB, "/v1/convert").status_code == 401
         answer = client.post(

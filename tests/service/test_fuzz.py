@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from schemathesis import GenerationMode
 
 from service.app import create_app
-from service.config import ServiceSettings
+from tests.service.apps import app_client
 from tests.service.conftest import open_box
 
 DESCRIPTION: Final[dict[str, Any]] = create_app().openapi()
@@ -58,8 +58,7 @@ QUICK: Final = settings(
 @pytest.fixture(scope="module")
 def fuzzed() -> Iterator[tuple[TestClient, str]]:
     """A service with room for one session, which is there, and small frames."""
-    small = ServiceSettings(
-        token=None,
+    with app_client(
         pool_size=0,
         max_sessions=1,
         max_frame_width=64,
@@ -67,8 +66,7 @@ def fuzzed() -> Iterator[tuple[TestClient, str]]:
         max_samples=4,
         max_wait_ms=20,
         max_elements=20_000,
-    )
-    with TestClient(create_app(small)) as client:
+    ) as client:
         path = open_box(client)
         yield client, path
         assert client.get(path).status_code == 200, "the session has come through"

@@ -9,8 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,9 +20,7 @@ import pytest
 
 from tests.engine.scenes import box_document
 from tests.service.problem import problem_of
-
-PATIENCE = 60.0
-"""Seconds after which what should have happened has not."""
+from tests.service.processes import PATIENCE, children_of, eventually, is_running
 
 LOOSE = {"error_tolerance": 0.05}
 ENDLESS = {"error_tolerance": 1e-6, "max_elements": 2_000_000}
@@ -38,6 +35,10 @@ class Service:
 
     def workers(self) -> set[int]:
         """Process ids of its workers."""
+        return {worker for nursery in self.nurseries() for worker in children_of(nursery)}
+
+    def nurseries(self) -> set[int]:
+        """Process ids of what its workers are forked from: one, or none."""
         return children_of(self.process.pid)
 
     def open(self, settings: dict[str, Any]) -> str:
@@ -45,34 +46,6 @@ class Service:
         answer = self.http.post("/v1/sessions", json={"scene": box_document(), "settings": settings})
         assert answer.status_code == 201, answer.text
         return str(answer.headers["location"])
-
-
-def children_of(pid: int) -> set[int]:
-    found = set()
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = status.read_text().rpartition(")")[2].split()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if int(fields[1]) == pid and fields[0] != "Z":
-            found.add(int(status.parent.name))
-    return found
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
-def eventually(holds: Callable[[], bool]) -> bool:
-    deadline = time.monotonic() + PATIENCE
-    while not holds():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
 
 
 @contextmanager

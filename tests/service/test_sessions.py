@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import os
 import socket
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketDenialResponse
 
-from service.app import create_app
-from service.config import ServiceSettings
 from service.hosting import remote, sessions
+from service.hosting.nursery import DistantProcess, Nursery
 from tests.engine.scenes import box_document
+from tests.service.apps import app_client
 from tests.service.conftest import LOOSE, context_of, open_box
 from tests.service.problem import fields_at_fault, problem_of
-
-
-@contextmanager
-def service(**settings: object) -> Iterator[TestClient]:
-    with TestClient(create_app(ServiceSettings(token=None, **settings))) as client:  # type: ignore[arg-type]
-        yield client
-
-
-def is_running(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
+from tests.service.processes import eventually, is_running
 
 
 def test_a_new_session_tells_its_status_and_place(client: TestClient) -> None:
@@ -156,7 +137,7 @@ def test_limits_are_told_and_free_what_was_taken() -> None:
         "max_elements": 1000,
         "max_links": 1000,
     }
-    with service(pool_size=1, refill_delay=0.0, max_edits=2, max_probe_points=1, **limits) as client:
+    with app_client(pool_size=1, max_edits=2, max_probe_points=1, **limits) as client:
         square = box_document()["objects"][0]
         many = {"objects": [{**square, "id": str(n)} for n in range(5)]}
         problem = problem_of(client.post("/v1/sessions", json={"scene": many}), 413)
@@ -186,18 +167,9 @@ def test_limits_are_told_and_free_what_was_taken() -> None:
         assert client.delete(open_box(client)).status_code == 204, "there is room again"
 
 
-def eventually(holds: Callable[[], bool]) -> bool:
-    deadline = time.monotonic() + 30.0
-    while not holds():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
-
-
 @pytest.mark.slow
 def test_an_idle_session_sleeps_until_it_is_needed() -> None:
-    with service(pool_size=2, refill_delay=0.0, idle_seconds=0.4) as client:
+    with app_client(pool_size=2, idle_seconds=0.4) as client:
         path = open_box(client)
         edits = {"edits": [{"op": "remove", "id": "crate"}]}
         assert client.post(f"{path}/edits", json=edits).json()["revision"] == 2
@@ -225,7 +197,7 @@ def test_an_idle_session_sleeps_until_it_is_needed() -> None:
 
 
 def test_a_session_that_nobody_wants_expires() -> None:
-    with service(pool_size=1, refill_delay=60.0, expire_seconds=0.4) as client:
+    with app_client(pool_size=1, expire_seconds=0.4) as client:
         path = open_box(client)
         pid = context_of(client).sessions.find(path.rpartition("/")[2]).worker.pid
         assert eventually(lambda: client.get("/v1/sessions").json() == {"sessions": []})
@@ -236,7 +208,7 @@ def test_a_session_that_nobody_wants_expires() -> None:
 @pytest.mark.slow
 def test_who_dozes_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sessions, "_DOZING", 0.0)
-    with service(pool_size=2, refill_delay=0.0, max_sessions=1, max_kept_sessions=2) as client:
+    with app_client(pool_size=2, max_sessions=1, max_kept_sessions=2) as client:
         first, second = open_box(client), open_box(client)
         awake = {f"/v1/sessions/{s['id']}": s["awake"] for s in client.get("/v1/sessions").json()["sessions"]}
         assert awake == {first: False, second: True}
@@ -250,7 +222,7 @@ def test_who_dozes_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_a_used_session_does_not_expire() -> None:
-    with service(pool_size=1, refill_delay=60.0, idle_seconds=0.4) as client:
+    with app_client(pool_size=1, idle_seconds=0.4) as client:
         path = open_box(client, error_tolerance=1e-6, max_elements=20)
         # The solve stops at its limit, so that the wait ends by its own time, later than the idle time.
         query = {"renderer": "path", "wait": "max_error=1e-9", "timeout_ms": 1500}
@@ -259,7 +231,7 @@ def test_a_used_session_does_not_expire() -> None:
 
 
 def test_a_token_is_asked_for_where_there_is_one() -> None:
-    with TestClient(create_app(ServiceSettings(token="secret", pool_size=0))) as client:
+    with app_client(token="secret", pool_size=0) as client:
         for path in ("/v1/sessions", "/v1/scenes", "/metrics"):
             answer = client.get(path)
             assert problem_of(answer, 401)["type"] == "urn:halflight:unauthorized"
@@ -272,9 +244,8 @@ def test_a_token_is_asked_for_where_there_is_one() -> None:
 
 
 def test_a_token_opens_its_own_sessions_alone() -> None:
-    settings = ServiceSettings.model_validate({"token": "all", "tokens": "ann, ben", "pool_size": 0})
     ann, ben, every = ({"Authorization": f"Bearer {token}"} for token in ("ann", "ben", "all"))
-    with TestClient(create_app(settings)) as client:
+    with app_client(token="all", tokens="ann, ben", pool_size=0) as client:
         problem_of(client.get("/v1/sessions"), 401)
         answer = client.post("/v1/sessions", json={"scene": box_document(), "settings": LOOSE}, headers=ann)
         path = answer.headers["location"]
@@ -300,13 +271,13 @@ def test_a_token_opens_its_own_sessions_alone() -> None:
 
 
 def test_a_worker_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    def spawn(theirs: socket.socket) -> subprocess.Popen[bytes]:
-        return subprocess.Popen([sys.executable, "-c", "pass"])
+    def nobody(self: Nursery, theirs: socket.socket) -> DistantProcess:
+        raise ConnectionError
 
-    monkeypatch.setattr(remote, "_spawn", spawn)
-    with service(pool_size=0) as client:
+    monkeypatch.setattr(Nursery, "worker", nobody)
+    with app_client(pool_size=0) as client:
         answer = client.post("/v1/sessions", json={"scene": {}})
         assert "could not be started" in problem_of(answer, 503)["detail"]
         assert client.get("/v1/sessions").json() == {"sessions": []}
-    with pytest.raises(remote.WorkerNotStartedError), service(pool_size=1):
+    with pytest.raises(remote.WorkerNotStartedError), app_client(pool_size=1):
         pass

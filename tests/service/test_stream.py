@@ -17,8 +17,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
-from service.app import create_app
-from service.config import ServiceSettings
+from tests.service.apps import app_client
 from tests.service.conftest import context_of, open_box
 from tests.service.problem import problem_of
 from tests.service.streams import Received, Viewer, viewing
@@ -283,11 +282,9 @@ def test_a_stream_outlasts_a_worker(client: TestClient) -> None:
 @pytest.fixture(scope="module")
 def strict() -> Iterator[tuple[TestClient, str]]:
     """A service that asks for a token, and has little patience."""
-    settings = ServiceSettings.model_validate(
-        {"token": "sesame", "pool_size": 0, "max_message_bytes": 1000, "stream_idle_seconds": 0.5}
-    )
-    headers = {"Authorization": "Bearer sesame"}
-    with TestClient(create_app(settings), headers=headers) as client:
+    limits = {"max_message_bytes": 1000, "stream_idle_seconds": 0.5}
+    with app_client(token="sesame", pool_size=0, **limits) as client:
+        client.headers["Authorization"] = "Bearer sesame"
         path = open_box(client)
         del client.headers["Authorization"]
         yield client, path

@@ -15,8 +15,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from tests.service.processes import PATIENCE, eventually
 from tests.service.streams import Viewer
-from tests.service.test_server import ENDLESS, LOOSE, PATIENCE, Service, eventually, running
+from tests.service.test_server import ENDLESS, LOOSE, Service, running
 
 SIZE = {"width": 320, "height": 240}
 

@@ -17,7 +17,8 @@ import httpx
 import pytest
 
 from tests.service.problem import problem_of
-from tests.service.test_server import LOOSE, PATIENCE, Service, eventually, running
+from tests.service.processes import PATIENCE, eventually
+from tests.service.test_server import LOOSE, Service, running
 
 
 def move(x: float) -> dict[str, Any]:
