@@ -3,6 +3,12 @@
 Conjugate gradients on the symmetric form of (I - rho T) B = E, whose preconditioned residual is the
 unshot radiosity itself: the search directions are combinations of shots, and Jacobi's iteration
 ([H 4.3], step 2) is its first step.
+
+What is unshot errs by what becomes of it after all reflections: 1 / (1 - rho) times as much in a closed room
+of reflectance rho. How slowly light dies away, the least eigenvalue of I - rho T, is told by the steps
+themselves: their lengths and turns make up Lanczos's tridiagonal matrix, whose eigenvalues tend to those of
+the operator, the extreme ones first (Golub and Van Loan, Matrix Computations, 10.3).
+Later runs, which begin near the end, go by what earlier ones have found.
 """
 
 from __future__ import annotations
@@ -18,9 +24,17 @@ from solver.types import FloatArray, IntArray, Spectra
 
 MOST_STEPS: Final = 500
 
+ORDINARY_LOSS: Final = 0.3
+"""Share of light that a reflection takes away in a room of mid grey. Where it is less, what may be left unshot
+is less in proportion."""
 
-def settle(state: TransportState, target: float) -> Generator[float | None, None, bool]:
+
+def settle(
+    state: TransportState, target: float, amplified: bool = True
+) -> Generator[float | None, None, bool]:
     """Work until the unshot radiosity is below `target` of the radiosity, both RMS.
+
+    Further where light dies away slowly and what is left unshot comes to more than that, if `amplified`.
 
     Yields the unshot share, or None in the midst of a gather.
     Emission does not count as radiosity here: a small bright lamp would outshine all that is unshot.
@@ -37,13 +51,18 @@ def settle(state: TransportState, target: float) -> Generator[float | None, None
     direction = unshot.copy()
     energy = np.zeros(state.channels)
     _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
+    lengths: list[FloatArray] = []
+    turns: list[FloatArray] = []
     for _ in range(MOST_STEPS):
         held, left, scale, unsent = _measure(
             leaves, patch, area, moment, emission, state.radiosity, unshot
         )  # fmt: skip
         yield unsent / max(held, 1e-300)
         if np.sqrt(left) <= target * np.sqrt(scale):
-            return True
+            state.loss = min(state.loss, _least_loss(lengths, turns))
+            loss = max(state.loss, 1.0 - float(reflectance.max(initial=0.0))) if amplified else 1.0
+            if np.sqrt(left) <= target * np.sqrt(scale) * min(1.0, loss / ORDINARY_LOSS):
+                return True
         moved = yield from state.gather_in_steps(direction)
         arrived = moved.copy()
         yield None
@@ -58,8 +77,27 @@ def settle(state: TransportState, target: float) -> Generator[float | None, None
         _advance(-length, moved, unshot)
         before, energy = energy, np.zeros(state.channels)
         _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
-        _turn(_ratio(energy, before), unshot, direction)
+        share = _ratio(energy, before)
+        _turn(share, unshot, direction)
+        lengths.append(length)
+        turns.append(share)
     return False
+
+
+def _least_loss(lengths: list[FloatArray], turns: list[FloatArray]) -> float:
+    """The least eigenvalue of Lanczos's matrix over the steps so far, of the channel where it is least."""
+    least = 1.0
+    for length, share in zip(np.transpose(lengths), np.transpose(turns), strict=True):
+        n = int(np.argmin(length > 0.0)) if np.any(length <= 0.0) else len(length)
+        if n == 0:
+            continue
+        inverse = 1.0 / length[:n]
+        matrix = np.diag(inverse)
+        matrix[np.arange(1, n), np.arange(1, n)] += share[: n - 1] * inverse[: n - 1]
+        beside = np.sqrt(share[: n - 1]) * inverse[: n - 1]
+        matrix[np.arange(1, n), np.arange(n - 1)] = beside
+        least = min(least, float(np.linalg.eigvalsh(matrix)[0]))
+    return least
 
 
 def _ratio(above: FloatArray, below: FloatArray) -> FloatArray:

@@ -288,7 +288,7 @@ class RadiositySolver(SlicedSolve):
     def _settle(self, target: float, strict: bool = False) -> Generator[bool, None, bool]:
         for _ in balance(self._state, bool(self._closed), strict):
             yield True
-        work = settle(self._state, target)
+        work = settle(self._state, target, self.settings.relative_cutoff is None)
         while True:
             try:
                 share = next(work)

@@ -39,6 +39,8 @@ class TransportState:
     remainder: FloatArray
     """(n, 3) coupling of each leaf with itself"""
     gathers: int = 0
+    loss: float = 1.0
+    """Least share of any light that one reflection takes away, as far as settling has found out"""
 
     @staticmethod
     def of(surfaces: Surfaces) -> TransportState:

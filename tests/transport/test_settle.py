@@ -9,7 +9,18 @@ from solver.transport.settings import SolverSettings
 from solver.transport.settle import settle
 from solver.transport.state import TransportState
 from solver.types import FloatArray
-from tests.transport.solving import finish, furnace, inner, leaves_of, lit_cube, shelf, solver_of, state_of
+from tests.pathtracing.worlds import world
+from tests.transport.solving import (
+    box,
+    finish,
+    furnace,
+    inner,
+    leaves_of,
+    lit_cube,
+    shelf,
+    solver_of,
+    state_of,
+)
 
 
 def small(name: str) -> TransportState:
@@ -72,6 +83,17 @@ def test_unshot_goes_below_the_target(name: str, target: float) -> None:
     assert unshot(state) <= 1.01 * target
     assert shares[-1] <= 10.0 * target, "the share told is by amount, the target by RMS"
     assert len(shares) < 60
+
+
+@pytest.mark.parametrize("reflectance", [0.9, 0.99, 0.999])
+def test_light_that_lasts_is_settled_further(reflectance: float) -> None:
+    """What is absorbed is what is emitted, however many reflections that takes."""
+    lamp = box("lamp", reflectance, 10.0, (0.4, 0.4, 0.7), (0.6, 0.6, 0.8), inward=False)
+    scene = world(box("room", reflectance), lamp)
+    state = state_of(finish(solver_of(scene, SolverSettings(error_tolerance=0.1))))
+    leaf = leaves_of(state)
+    absorbed = (1.0 - reflectance) * float(state.tree.area[leaf] @ state.received[leaf, 0, 0])
+    assert absorbed == pytest.approx(float(scene.surfaces.area @ scene.surfaces.emission[:, 0]), rel=5e-3)
 
 
 def test_settled_light_takes_no_step() -> None:
