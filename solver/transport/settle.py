@@ -25,8 +25,8 @@ from solver.types import FloatArray, IntArray, Spectra
 MOST_STEPS: Final = 500
 
 ORDINARY_LOSS: Final = 0.3
-"""Share of light that a reflection takes away in a room of mid grey. Where it is less, what may be left unshot
-is less in proportion."""
+"""Share of light that a reflection takes away in a room of mid grey. Where it is less, what may be left
+unshot is less in proportion."""
 
 
 def settle(
