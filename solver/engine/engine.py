@@ -17,6 +17,7 @@ import numpy as np
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
 from solver.engine.change_log import ChangeLog, Progress
+from solver.engine.checkpoint import Checkpoint
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.exports.files import Export, ExportRequest, encode_export
 from solver.engine.fine import FineLight
@@ -76,10 +77,12 @@ class Engine:
         limits: SceneLimits | None = None,
         drawing: Drawing | None = None,
         frame_limits: FrameLimits | None = None,
+        kept: Checkpoint | None = None,
     ) -> None:
         """Take `scene` as revision 1, or go on from a past with light that settles anew.
 
-        `drawing` makes the frames, and may be shared by engines of one thread. Raises LimitExceededError, and
+        `drawing` makes the frames, and may be shared by engines of one thread. Where the solution that was
+        `kept` is the one of this scene by these settings, it is gone on from. Raises LimitExceededError, and
         SceneError where a past has an edit that cannot be applied.
         """
         past = scene if isinstance(scene, Past) else Past(scene)
@@ -106,7 +109,7 @@ class Engine:
         """Whether the solution is that of an earlier world"""
         self._power: dict[ObjectId, float] = {}
         """W of luminance that left each object before the last transition"""
-        self._settle(World.of(standing), None, False)
+        self._settle(World.of(standing), None, False, kept)
 
     @property
     def scene(self) -> Scene:
@@ -306,11 +309,17 @@ class Engine:
         self._frame_limits.check(camera, 1)
         return camera
 
-    def _settle(self, world: World, earlier: Solution | None, drags: bool) -> None:
-        """Let light settle in `world`, anew or from what it was `earlier`."""
+    def checkpoint(self) -> Checkpoint | None:
+        """The solution as it is to be kept, None while it does not rest; good until the next edit."""
+        return None if self._is_behind else self._solution.checkpoint()
+
+    def _settle(
+        self, world: World, earlier: Solution | None, drags: bool, kept: Checkpoint | None = None
+    ) -> None:
+        """Let light settle in `world`, anew or from what it was `earlier`, or was `kept`."""
         seen = None if self._fine is None else self._fine.interpolants
         solution = Solution(
-            world, self._settings, earlier, self._revision, drags, self._memory, anew=seen is not None
+            world, self._settings, earlier, self._revision, drags, self._memory, seen is not None, kept
         )
         self._seen = None if solution.trace() is None else seen or self._seen
         self._world, self._solution, self._paths = world, solution, PathFrames(world)

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from solver.engine.checkpoint import Checkpoint, checkpoint_of, solver_of
 from solver.engine.sampled import SampledSolver
 from solver.engine.status import SessionState
 from solver.engine.world import World
@@ -40,12 +41,13 @@ class Solution:
         drags: bool = False,
         memory: Memory | None = None,
         anew: bool = True,
+        kept: Checkpoint | None = None,
     ) -> None:
         """Go on from `earlier`, the solution of an earlier revision, which is used up, unless it failed.
 
         `number` of the edit in between, which moves on what the one before moved, and nothing else, if it
         `drags`; what it does to the light is traced `anew`. A solution that `memory` has is taken from there;
-        it is shown this one when it has settled.
+        it is shown this one when it has settled. One that was `kept` is gone on from, if it is of this world.
         """
         self.world = world
         self.solver: RadiositySolver | SampledSolver
@@ -55,7 +57,8 @@ class Solution:
         self._memory = memory or Memory(0)
         self._remembering: Iterator[None] | None = None
         before = None if earlier is None else earlier.handed_over()
-        recalled = self._memory.recall(surfaces, rays, settings)
+        recalled = None if kept is None else solver_of(kept, surfaces, rays, settings)
+        recalled = recalled or self._memory.recall(surfaces, rays, settings)
         if recalled is not None:
             self.solver = recalled
         elif surfaces.patch_count > MOST_LINKED:
@@ -85,6 +88,10 @@ class Solution:
         if self._lent:
             solver.keep_a_copy()
         return solver
+
+    def checkpoint(self) -> Checkpoint | None:
+        """What is to be kept of it; None while it does not rest, or where it failed."""
+        return None if self._failure is not None else checkpoint_of(self.solver)
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; True while more work remains."""

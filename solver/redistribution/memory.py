@@ -51,7 +51,7 @@ class Memory:
 
     def remember(self, solver: RadiositySolver) -> Iterator[None]:
         """Keep a copy of a settled solution, if there is room; yields every few milliseconds."""
-        key = _name_of(solver.surfaces, solver.settings)
+        key = name_of(solver.surfaces, solver.settings)
         if key in self._kept:
             self._kept.move_to_end(key)
             return
@@ -65,13 +65,13 @@ class Memory:
 
     def recall(self, surfaces: Surfaces, rays: RayScene, settings: SolverSettings) -> RadiositySolver | None:
         """The solution of a scene that was settled by the same settings; it is no longer kept then."""
-        kept = self._kept.pop(_name_of(surfaces, settings), None)
+        kept = self._kept.pop(name_of(surfaces, settings), None)
         if kept is None:
             return None
         return kept.solver.again(surfaces, rays, kept.state)
 
 
-def _name_of(surfaces: Surfaces, settings: SolverSettings) -> bytes:
+def name_of(surfaces: Surfaces, settings: SolverSettings) -> bytes:
     """What tells scenes and settings apart that have different solutions."""
     told = hashlib.blake2b(repr((surfaces.object_ids, settings)).encode())
     for array in (
