@@ -40,6 +40,12 @@ class GrowingArray(Generic[T]):
         """Append rows."""
         self._extend(len(rows))[...] = rows
 
+    def extend(self, count: int) -> int:
+        """Append `count` rows with anything in them; returns the first one's number."""
+        first = self._size
+        self._extend(count)
+        return first
+
     def truncate(self, count: int) -> None:
         """Keep the first `count` rows."""
         self._size = min(self._size, count)

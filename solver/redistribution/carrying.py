@@ -14,7 +14,7 @@ from solver.geometry.surfaces import Surfaces
 from solver.redistribution.matching import Match
 from solver.transport.elements import ElementTree
 from solver.transport.pushpull import gather, means, pull
-from solver.transport.state import TransportState
+from solver.transport.state import TransportState, ambient, shine_of
 from solver.types import FloatArray, IntArray
 
 
@@ -27,35 +27,52 @@ class Carried:
     """(n,) the element that each one was before, -1 for none"""
     dimmed: FloatArray
     """(n,) luminance irradiance, W/m2, that links of the element have lost with patches that are gone"""
+    moments: FloatArray | None = None
+    """(n, 3, channels) of what all elements send, where that is known"""
 
 
-def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) -> Carried:
+def carry(
+    state: TransportState,
+    surfaces: Surfaces,
+    match: Match,
+    edit: int,
+    moments: FloatArray | None = None,
+    in_place: bool = False,
+) -> Carried:
     """What `state` is in the scene of `surfaces`; its link table is handed over, not copied.
 
     Links that were blocked by patches that are gone are in debt, or come into it by that to `edit`; those of
     such patches are removed. Irradiance is right but for links that the edit has changed, and for fresh
     patches, whose irradiance is a guess: what they received where they were before, or the ambient term.
+
+    `moments` (n, 3, channels) are those of `state`, where they are known. Where all that has happened is that
+    undivided patches have moved, as in the midst of a drag, all can stay where it is, and does if `in_place`.
     """
+    if in_place and _can_stay(state, surfaces, match):
+        return _carry_in_place(state, surfaces, match, moments)
     tree, number = ElementTree.carried(surfaces, state.tree, match.number)
     links = state.links
-    removed = np.flatnonzero((number[links.p] < 0) | (number[links.q] < 0)).astype(np.int32)
-    lost = sent_over(state, removed)
+    removed = links.rows_of(number < 0)
+    lost = sent_over(state, removed, moments)
     if not match.only_moves:
         links.forget(match.number, edit)
     links.remove(removed)
     links.renumber(number, match.number)
 
-    blank = TransportState.of(surfaces)
-    channels = blank.channels
+    weights, emission, reflectance = shine_of(surfaces)
+    channels = len(weights)
     # The earlier element that each one was; fresh ones take any, for now.
     source = np.zeros(len(tree), dtype=np.int32)
     kept = np.flatnonzero(number >= 0)
     source[number[kept]] = kept
     fresh = match.fresh
-    after = replace(
-        blank,
+    after = TransportState(
+        surfaces=surfaces,
         tree=tree,
         links=links,
+        weights=weights,
+        emission=emission,
+        reflectance=reflectance,
         radiosity=_in_channels(state, state.radiosity[source], channels),
         received=_in_channels(state, state.received[source], channels),
         closure=state.closure[source],
@@ -73,7 +90,7 @@ def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) ->
         after.add_received(lost, -1.0)
     _repaint(state, after, match)
     known = match.likeness[fresh] >= 0
-    after.received[fresh, 0] = blank.received[fresh, 0]
+    after.received[fresh, 0] = ambient(surfaces.area, emission, reflectance)
     if known.any():
         before = _in_channels(state, means(state.tree, state.received), channels)
         after.received[fresh[known], 0] = before[match.likeness[fresh[known]]]
@@ -82,15 +99,58 @@ def carry(state: TransportState, surfaces: Surfaces, match: Match, edit: int) ->
     return Carried(after, source, dimmed)
 
 
-def sent_over(state: TransportState, rows: IntArray) -> FloatArray:
-    """Irradiance functions (n, 3, channels) that the links `rows` bring to their own ends."""
+def _can_stay(state: TransportState, surfaces: Surfaces, match: Match) -> bool:
+    """Whether patches have moved that are leaves, and nothing else has happened."""
+    now, before = surfaces, state.surfaces
+    return (
+        match.only_moves
+        and not (state.tree.child[match.gone] >= 0).any()
+        and np.array_equal(now.emission, before.emission)
+        and np.array_equal(now.reflectance, before.reflectance)
+    )
+
+
+def _carry_in_place(
+    state: TransportState, surfaces: Surfaces, match: Match, moments: FloatArray | None
+) -> Carried:
+    """As `carry`, where patches that are leaves have moved: they have the means that they had."""
+    tree, fresh = state.tree, match.fresh
+    moved = np.zeros(len(tree), dtype=np.bool_)
+    moved[fresh] = True
+    removed = state.links.rows_of(moved)
+    guess = state.received[fresh, 0]
+    dimmed = np.zeros(len(tree))
+    if len(removed):
+        lost = sent_over(state, removed, moments)
+        lost[fresh] = 0.0
+        dimmed = np.abs(lost[:, 0] @ state.weights)
+        state.add_received(lost, -1.0)
+    state.links.remove(removed)
+    tree.move(surfaces, fresh)
+    state.closure[fresh] = 1.0
+    for functions in (state.radiosity, state.received, state.remainder):
+        functions[fresh] = 0.0
+    state.received[fresh, 0] = guess
+    state.radiosity[fresh, 0] = state.emission[fresh] + state.reflectance[fresh] * guess
+    if moments is not None:
+        moments[fresh] = state.radiosity[fresh]
+    source = np.arange(len(tree), dtype=np.int32)
+    source[fresh] = -1
+    return Carried(replace(state, surfaces=surfaces), source, dimmed, moments)
+
+
+def sent_over(state: TransportState, rows: IntArray, moments: FloatArray | None = None) -> FloatArray:
+    """Irradiance functions (n, 3, channels) that the links `rows` bring to their own ends.
+
+    `moments` (n, 3, channels) of what elements send are found where they are not known.
+    """
     arrived = np.zeros_like(state.received)
     if len(rows):
         links = state.links
         exchange = links.open_exchange[rows] * links.visibility[rows]
         gather(
             links.p[rows], links.q[rows], exchange, links.slope_p[rows], links.slope_q[rows],
-            state.tree.area, moments_of(state), 0, len(rows), arrived,
+            state.tree.area, moments_of(state) if moments is None else moments, 0, len(rows), arrived,
         )  # fmt: skip
     return arrived
 

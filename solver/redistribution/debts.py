@@ -8,14 +8,19 @@ of an object that is being dragged: when it moves on, such a debt is void, and l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.kernels import inline_kernel, kernel
+from solver.parallel import run_chunks
 from solver.redistribution.matching import Match
-from solver.redistribution.reach import COMING, LEAVING, boxes_around, reached_links
+from solver.redistribution.reach import COMING, LEAVING, bounds_of, boxes_around, hull_meets, met_pairs
 from solver.transport.state import TransportState
-from solver.types import IntArray
+from solver.types import ByteArray, FloatArray, IntArray
+
+_CHUNK: Final = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,19 +67,62 @@ def owe(
 
     margin: metres. `drags`: what moves is what was moved before, and debts for where it is now are void.
     """
-    links = state.links
-    waiting = links.debt < 0
-    links.debt[waiting] = 0 if drags else -links.debt[waiting]
+    links, tree = state.links, state.tree
     gone, fresh = match.gone, match.fresh
-    if len(gone) + len(fresh) == 0:
-        return
-    leaving = boxes_around(state.surfaces.corners[gone], state.surfaces.object[gone])
-    coming = boxes_around(surfaces.corners[fresh], surfaces.object[fresh])
-    reached = reached_links(state.tree, links, leaving, coming, margin)
-    debt = links.debt
-    left = (reached & LEAVING != 0) & (debt == 0)
-    if drags:
-        # Links in debt to the place that is left have never known it.
-        left &= ~waiting
-    debt[left] = number
-    debt[(reached & COMING != 0) & (debt == 0)] = -number
+    boxes = (
+        boxes_around(state.surfaces.corners[gone], state.surfaces.object[gone]),
+        boxes_around(surfaces.corners[fresh], surfaces.object[fresh]),
+    )
+    for box in boxes:
+        box[:, 0] -= margin
+        box[:, 1] += margin
+    met, bounds = met_pairs(tree, boxes), bounds_of(tree)
+
+    def work(start: int, stop: int) -> None:
+        _owe(
+            links.p, links.q, tree.patch, bounds, met, boxes[LEAVING], boxes[COMING], number, drags, start,
+            stop, links.debt,
+        )  # fmt: skip
+
+    run_chunks(work, len(links), _CHUNK)
+
+
+@inline_kernel
+def _meets(first: FloatArray, second: FloatArray, boxes: FloatArray) -> bool:
+    for k in range(len(boxes)):
+        if hull_meets(first[0], first[1], second[0], second[1], boxes[k, 0], boxes[k, 1]):
+            return True
+    return False
+
+
+@kernel
+def _owe(
+    p: IntArray,
+    q: IntArray,
+    patch: IntArray,
+    bounds: FloatArray,
+    met: ByteArray,
+    leaving: FloatArray,
+    coming: FloatArray,
+    number: int,
+    drags: bool,
+    start: int,
+    stop: int,
+    debt: IntArray,
+) -> None:
+    for link in range(start, stop):
+        owed = debt[link]
+        waits = owed < 0
+        if waits:
+            owed = 0 if drags else -owed
+        if owed == 0:
+            i = p[link]
+            j = q[link]
+            # Links in debt to a place that is left have never known it.
+            knew = not (waits and drags)
+            if knew and met[LEAVING, patch[i], patch[j]] and _meets(bounds[i], bounds[j], leaving):
+                owed = number
+            elif met[COMING, patch[i], patch[j]] and _meets(bounds[i], bounds[j], coming):
+                owed = -number
+        if owed != debt[link]:
+            debt[link] = owed

@@ -62,5 +62,7 @@ def match_patches(before: Surfaces, after: Surfaces) -> Match:
 
 def _ranges(surfaces: Surfaces) -> list[slice]:
     """The patches of each object, which stand side by side."""
-    ends = np.searchsorted(surfaces.object, np.arange(len(surfaces.object_ids) + 1)).tolist()
+    ends = np.searchsorted(
+        surfaces.object, np.arange(len(surfaces.object_ids) + 1, dtype=surfaces.object.dtype)
+    ).tolist()
     return [slice(start, stop) for start, stop in pairwise(ends)]

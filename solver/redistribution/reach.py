@@ -15,46 +15,41 @@ import numpy as np
 from solver.kernels import inline_kernel, kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
-from solver.transport.links import LinkTable
 from solver.types import ByteArray, Corners, FloatArray, IntArray
 from solver.visibility.bvh import build_hierarchy
 
 _CHUNK: Final = 1 << 15
 
 
-LEAVING: Final = 1
-COMING: Final = 2
+LEAVING: Final = 0
+COMING: Final = 1
 """What a link's light may pass through: what is about to go, and what is about to come."""
 
 
-def reached_links(
-    tree: ElementTree, links: LinkTable, leaving: FloatArray, coming: FloatArray, margin: float
-) -> ByteArray:
-    """For each link (n,) which boxes its light may pass through, as a sum of LEAVING and COMING.
-
-    Boxes (k, 2, 3) are grown by `margin` metres.
-    """
+def met_pairs(tree: ElementTree, boxes: tuple[FloatArray, FloatArray]) -> ByteArray:
+    """1 in (2, p, p) where light between two patches may pass through boxes (k, 2, 3), LEAVING or COMING."""
     count = tree.patch_count
-    met = np.zeros((count, count), dtype=np.uint8)
+    met = np.zeros((2, count, count), dtype=np.uint8)
     corners = tree.corners[:count]
-    hierarchy = build_hierarchy(corners, np.arange(count, dtype=np.int32))
+    h = build_hierarchy(corners, np.arange(count, dtype=np.int32))
     low, high = corners.min(axis=1), corners.max(axis=1)
-    boxes = np.concatenate([leaving, coming])
-    kind = np.repeat(np.array([LEAVING, COMING], dtype=np.uint8), [len(leaving), len(coming)])
-    boxes[:, 0] -= margin
-    boxes[:, 1] += margin
-    for box, bit in zip(boxes, kind, strict=True):
-        _reach_patches(
-            hierarchy.low, hierarchy.high, hierarchy.skip, hierarchy.first, hierarchy.count, hierarchy.order,
-            low, high, box[0], box[1], int(bit), met,
-        )  # fmt: skip
-    found = np.zeros(len(links), dtype=np.uint8)
 
     def work(start: int, stop: int) -> None:
-        _reach_links(links.p, links.q, tree.patch, tree.corners, met, boxes, kind, start, stop, found)
+        for kind in range(start, stop):
+            for box in boxes[kind]:
+                _reach_patches(
+                    h.low, h.high, h.skip, h.first, h.count, h.order, low, high, box[0], box[1], met[kind]
+                )
 
-    run_chunks(work, len(links), _CHUNK)
-    return found
+    run_chunks(work, len(boxes), 1)
+    return met
+
+
+def bounds_of(tree: ElementTree) -> FloatArray:
+    """Bounding boxes (n, 2, 3) of elements, metres."""
+    bounds = np.empty((len(tree), 2, 3))
+    run_chunks(lambda start, stop: _bound(tree.corners, start, stop, bounds), len(tree), _CHUNK)
+    return bounds
 
 
 def boxes_around(corners: Corners, owner: IntArray) -> FloatArray:
@@ -117,10 +112,9 @@ def _reach_patches(
     patch_high: FloatArray,
     box_low: FloatArray,
     box_high: FloatArray,
-    bit: int,
     met: ByteArray,
 ) -> None:
-    """Mark the pairs (p, p) of patches whose hull meets a box by `bit`, either way round."""
+    """Mark the pairs (p, p) of patches whose hull meets a box, either way round."""
     if len(skip) == 0:
         return
     stack = np.empty((4096, 2), dtype=np.int32)
@@ -141,8 +135,8 @@ def _reach_patches(
                     if hull_meets(
                         patch_low[p], patch_high[p], patch_low[q], patch_high[q], box_low, box_high
                     ):
-                        met[p, q] |= bit
-                        met[q, p] |= bit
+                        met[p, q] = 1
+                        met[q, p] = 1
             continue
         if a == b:
             first = a + 1
@@ -175,37 +169,12 @@ def _reach_patches(
 
 
 @kernel
-def _reach_links(
-    p: IntArray,
-    q: IntArray,
-    patch: IntArray,
-    corners: Corners,
-    met: ByteArray,
-    boxes: FloatArray,
-    kind: ByteArray,
-    start: int,
-    stop: int,
-    found: ByteArray,
-) -> None:
-    bounds = np.empty((4, 3))
-    for link in range(start, stop):
-        i = p[link]
-        j = q[link]
-        possible = met[patch[i], patch[j]]
-        if possible == 0:
-            continue
+def _bound(corners: Corners, start: int, stop: int, bounds: FloatArray) -> None:
+    for e in range(start, stop):
         for axis in range(3):
-            bounds[0, axis] = bounds[1, axis] = corners[i, 0, axis]
-            bounds[2, axis] = bounds[3, axis] = corners[j, 0, axis]
+            low = high = corners[e, 0, axis]
             for k in range(1, 4):
-                bounds[0, axis] = min(bounds[0, axis], corners[i, k, axis])
-                bounds[1, axis] = max(bounds[1, axis], corners[i, k, axis])
-                bounds[2, axis] = min(bounds[2, axis], corners[j, k, axis])
-                bounds[3, axis] = max(bounds[3, axis], corners[j, k, axis])
-        for box in range(len(boxes)):
-            if (
-                possible & kind[box]
-                and not found[link] & kind[box]
-                and hull_meets(bounds[0], bounds[1], bounds[2], bounds[3], boxes[box, 0], boxes[box, 1])
-            ):
-                found[link] |= kind[box]
+                low = min(low, corners[e, k, axis])
+                high = max(high, corners[e, k, axis])
+            bounds[e, 0, axis] = low
+            bounds[e, 1, axis] = high

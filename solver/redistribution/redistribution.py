@@ -28,11 +28,11 @@ from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, unneeded
 from solver.transport.estimate import Residuals
-from solver.transport.field import RadiosityField
+from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.pace import steps
-from solver.transport.pushpull import gather, means
+from solver.transport.pushpull import gather
 from solver.transport.refine import NOISE_SHARE, Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -110,13 +110,16 @@ class Redistribution(RadiositySolver):
         `number`: of the edit, greater than those before. `drags`: it moves the object that the edit before
         moved, and no other. `anew`: the trace of what happens begins with this edit.
         """
-        super().__init__(surfaces, rays, settings)
         match = match_patches(earlier.surfaces, surfaces)
         margin = 2.0 * tolerances.SIDE * max(surfaces.size, earlier.surfaces.size)
-        state = earlier.hand_over()
+        state, moments = earlier.hand_over(), None
         owe(state, surfaces, match, number, margin, drags)
-        carried = carry(state, surfaces, match, number)
-        self._state = carried.state
+        is_own = False
+        if isinstance(earlier, Redistribution):
+            moments, is_own = earlier.moments, earlier.is_own
+        carried = carry(state, surfaces, match, number, moments, in_place=is_own)
+        super().__init__(surfaces, rays, settings, carried.state)
+        self._moments = carried.moments
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
         self.bound, self.pace = earlier.bound, earlier.pace
@@ -146,6 +149,8 @@ class Redistribution(RadiositySolver):
         """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
         self._guessed_now = 1.0
         self._arrived: FloatArray | None = None
+        self._waits = False
+        """Whether something has arrived that elements have not received yet"""
         self._plan: _Plan | None = None
         self._paid = 0
         self._new = self._faded = np.empty(0, dtype=np.int32)
@@ -153,6 +158,16 @@ class Redistribution(RadiositySolver):
         self.looks = 0
         """Links and pairs looked at anew"""
         self._gathers_before = state.gathers
+
+    @property
+    def moments(self) -> FloatArray | None:
+        """Moments (n, 3, channels) of what elements send, where they are known."""
+        return self._moments
+
+    @property
+    def is_own(self) -> bool:
+        """Whether nobody else can have elements and light that are handed over: they have never rested."""
+        return self._handed is None and self.outcome is SolveOutcome.RUNNING
 
     @property
     def unlinked(self) -> UnlinkedPairs:
@@ -191,7 +206,7 @@ class Redistribution(RadiositySolver):
     def _open(self) -> Iterator[bool]:
         plan = self._plan or self._make_plan()
         state = self._state
-        moments = moments_of(state)
+        moments = self._known_moments()
         self._arrived = np.zeros_like(state.received)
         coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         # What has been shot is as uncertain as what has not, until it is propagated.
@@ -221,7 +236,7 @@ class Redistribution(RadiositySolver):
                 if self.unshot_power() > float(plan.left[part.stop]):
                     moments = yield from self._propagate()
         self._take_in()
-        self._arrived = None
+        self._arrived = self._moments = None
         unshot, scale = unshot_square(state)
         new = math.sqrt(unshot / scale) if scale > 0.0 else 1.0
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
@@ -254,7 +269,13 @@ class Redistribution(RadiositySolver):
         state.received += arrived
         state.radiosity = radiosity
         self.version += 1
-        return moments_of(state)
+        self._moments = None
+        return self._known_moments()
+
+    def _known_moments(self) -> FloatArray:
+        if self._moments is None:
+            self._moments = moments_of(self._state)
+        return self._moments
 
     def _refine_as_before(self) -> Iterator[bool]:
         """Refine what is new until it errs no more than what was there, in the light that has arrived."""
@@ -293,7 +314,7 @@ class Redistribution(RadiositySolver):
         state, pairs = self._state, self._unlinked
         links, tree = state.links, state.tree
         rows = np.flatnonzero(links.debt).astype(np.int32)
-        radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
+        radiosity = np.maximum(self._known_moments()[:, 0] @ state.weights, 0.0)
         reflectance = (state.reflectance @ state.weights)[tree.patch]
         p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
         energy, urgency = np.empty((2, len(p)))
@@ -371,13 +392,14 @@ class Redistribution(RadiositySolver):
             batch.p, batch.q, exchange, slope_p, slope_q, self._state.tree.area, moments, 0, len(batch.p),
             self._arrived,
         )  # fmt: skip
+        self._waits = True
 
     def _take_in(self) -> None:
         """Add what has arrived to what elements have received."""
-        if self._arrived is None:
-            return
-        self._state.add_received(self._arrived)
-        self._arrived[...] = 0.0
+        if self._arrived is not None and self._waits:
+            self._state.add_received(self._arrived)
+            self._arrived[...] = 0.0
+            self._waits = False
         self._state.received[self._fresh, 0] -= (self._guessed - self._guessed_now) * self._guess
         self._guessed = self._guessed_now
 

@@ -25,22 +25,24 @@ _COPIED: Final = ("corners", "corner_count", "child_count", "area", "centroid", 
 class ElementTree:
     """Struct of growing arrays; every property is a view over the live elements."""
 
-    def __init__(self, surfaces: Surfaces) -> None:
+    def __init__(self, surfaces: Surfaces, more: int = 0) -> None:
+        """The patches of `surfaces`, with room for `more` elements."""
         n = surfaces.patch_count
+        room = n + more + more // 16 + 1024
         self.patch_count = n
         self.patch_normal = surfaces.normal
         self.axes = plane_axes(surfaces.normal)
         """(p, 2, 3) orthonormal axes of each patch's plane"""
-        self._corners = GrowingArray((4, 3), np.float64, n + 1024)
-        self._corner_count = GrowingArray((), np.int32, n + 1024)
-        self._patch = GrowingArray((), np.int32, n + 1024)
-        self._parent = GrowingArray((), np.int32, n + 1024)
-        self._child = GrowingArray((), np.int32, n + 1024)
-        self._child_count = GrowingArray((), np.int32, n + 1024)
-        self._area = GrowingArray((), np.float64, n + 1024)
-        self._centroid = GrowingArray((3,), np.float64, n + 1024)
-        self._moment = GrowingArray((3,), np.float64, n + 1024)
-        self._offset = GrowingArray((2,), np.float64, n + 1024)
+        self._corners = GrowingArray((4, 3), np.float64, room)
+        self._corner_count = GrowingArray((), np.int32, room)
+        self._patch = GrowingArray((), np.int32, room)
+        self._parent = GrowingArray((), np.int32, room)
+        self._child = GrowingArray((), np.int32, room)
+        self._child_count = GrowingArray((), np.int32, room)
+        self._area = GrowingArray((), np.float64, room)
+        self._centroid = GrowingArray((3,), np.float64, room)
+        self._moment = GrowingArray((3,), np.float64, room)
+        self._offset = GrowingArray((2,), np.float64, room)
         self._corners.append(surfaces.corners)
         self._corner_count.append(surfaces.corner_count)
         self._patch.append(np.arange(n, dtype=np.int32))
@@ -184,9 +186,9 @@ class ElementTree:
         patch (p,) is the new number of each earlier patch, -1 where it is gone. Returns the same of each
         earlier element (n,) too.
         """
-        tree = ElementTree(surfaces)
         before = earlier.patch_count
         inner = np.flatnonzero(patch[earlier.patch[before:]] >= 0) + before
+        tree = ElementTree(surfaces, len(inner))
         number = np.full(len(earlier), -1, dtype=np.int32)
         number[:before] = patch
         number[inner] = np.arange(len(inner), dtype=np.int32) + tree.patch_count
@@ -201,6 +203,18 @@ class ElementTree:
         tree.child[patch[stays]] = np.where(first >= 0, number[first], -1)
         tree.child_count[patch[stays]] = earlier.child_count[stays]
         return tree, number
+
+    def move(self, surfaces: Surfaces, patches: IntArray) -> None:
+        """Put `patches` (k,), which are leaves, where `surfaces` have those of their numbers."""
+        self.patch_normal = surfaces.normal
+        self.axes[patches] = axes = plane_axes(surfaces.normal[patches])
+        self.corners[patches] = corners = surfaces.corners[patches]
+        self.area[patches] = surfaces.area[patches]
+        k = len(patches)
+        centroid, moment, offset = np.empty((k, 3)), np.empty((k, 3)), np.empty((k, 2))
+        number, none = np.arange(k, dtype=np.int32), np.full(k, -1, dtype=np.int32)
+        place_elements(corners, self.corner_count[patches], number, none, axes, 0, centroid, moment, offset)
+        self.centroid[patches], self.moment[patches] = centroid, moment
 
     def _place(self, start: int) -> None:
         """Find centroids, moments and offsets of the elements from `start` on."""

@@ -16,7 +16,7 @@ from solver.arrays import GrowingArray
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.pace import finish
-from solver.types import FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 
 _POOLED: Final = 1 << 21
 """Entries of blocker lists copied between two yields."""
@@ -206,12 +206,18 @@ class LinkTable:
 
     def overwrite(self, rows: IntArray, batch: LinkBatch) -> None:
         """Put the links of `batch` in the place of `rows` (n,), one for one."""
-        start = len(self._pool) + np.cumsum(batch.blocker_count, dtype=np.int64) - batch.blocker_count
+        count = batch.blocker_count
+        room = self.blocker_count[rows]
+        longer = np.where(count > room, count, 0)
+        first = self._pool.extend(int(longer.sum()))
+        start = np.where(
+            count > room, first + np.cumsum(longer, dtype=np.int64) - longer, self.blocker_start[rows]
+        )
+        put_ranges(batch.blockers, start, count, self.pool)
         for name in _COLUMNS:
             getattr(self, name)[rows] = getattr(batch, name)
         self.blocker_start[rows] = start
         self.debt[rows] = 0
-        self._pool.append(batch.blockers)
 
     def replace(self, gone: IntArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
         """Put links in the place of the rows `gone` (n,), ascending; yields every few milliseconds.
@@ -263,6 +269,13 @@ class LinkTable:
             _forget(self.pool, self.blocker_start, self.blocker_count, self.debt, patch, number, start, stop)
 
         run_chunks(work, len(self), 1 << 14)
+
+    def rows_of(self, chosen: BoolArray) -> IntArray:
+        """Rows, ascending, of the links of elements (n,) that are `chosen`."""
+        marked = np.empty(len(self), dtype=np.bool_)
+        p, q = self.p, self.q
+        run_chunks(lambda start, stop: _mark_ends(p, q, chosen, start, stop, marked), len(self), 1 << 16)
+        return np.flatnonzero(marked).astype(np.int32)
 
     def remove(self, gone: IntArray) -> None:
         """Take out the rows `gone` (n,), ascending. The last ones fill their places."""
@@ -333,6 +346,22 @@ def take_ranges(values: IntArray, start: Int64Array, count: IntArray) -> IntArra
             out[at] = values[i]
             at += 1
     return out
+
+
+@kernel
+def put_ranges(values: IntArray, start: Int64Array, count: IntArray, pool: IntArray) -> None:
+    """Put `values`, lists one after the other, into the ranges [start, start + count) of `pool`."""
+    at = 0
+    for k in range(len(start)):
+        for i in range(start[k], start[k] + count[k]):
+            pool[i] = values[at]
+            at += 1
+
+
+@kernel
+def _mark_ends(p: IntArray, q: IntArray, chosen: BoolArray, start: int, stop: int, marked: BoolArray) -> None:
+    for link in range(start, stop):
+        marked[link] = chosen[p[link]] or chosen[q[link]]
 
 
 @kernel

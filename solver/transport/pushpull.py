@@ -82,6 +82,24 @@ def push(parent: IntArray, offset: FloatArray, functions: FloatArray) -> None:
 
 
 @kernel
+def take_in(
+    parent: IntArray,
+    offset: FloatArray,
+    closure: FloatArray,
+    factor: float,
+    arrived: FloatArray,
+    received: FloatArray,
+) -> None:
+    """Push the functions `arrived` down and add them to `received`, times `factor` and `closure` (n,)."""
+    push(parent, offset, arrived)
+    for e in range(len(parent)):
+        scale = factor * closure[e]
+        for k in range(3):
+            for c in range(arrived.shape[2]):
+                received[e, k, c] += scale * arrived[e, k, c]
+
+
+@kernel
 def gather(
     p: IntArray,
     q: IntArray,

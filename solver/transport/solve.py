@@ -94,13 +94,14 @@ class RadiositySolver(SlicedSolve):
         surfaces: Surfaces,
         rays: RayScene,
         settings: SolverSettings,
+        state: TransportState | None = None,
     ) -> None:
-        """Set up the patches as the first elements; no light is moved yet."""
+        """Set up the patches as the first elements; no light is moved yet. Or go on from a `state`."""
         super().__init__(surfaces, settings)
         self._rays = rays
         self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
         self.pace = Pace()
-        self._state = TransportState.of(surfaces)
+        self._state = TransportState.of(surfaces) if state is None else state
         self._closed: bool | None = None
         self._ray_count = 0
         self._rounds = 0

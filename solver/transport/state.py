@@ -10,7 +10,7 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
-from solver.transport.pushpull import irradiance, irradiance_in_steps, pull, push
+from solver.transport.pushpull import irradiance, irradiance_in_steps, pull, take_in
 from solver.types import LUMINANCE_WEIGHTS, BoolArray, FloatArray, IntArray, Spectra
 
 
@@ -46,17 +46,15 @@ class TransportState:
     def of(surfaces: Surfaces) -> TransportState:
         """Patches as the first elements; no light has moved, and the ambient term stands for it."""
         n = surfaces.patch_count
-        channels = 1 if surfaces.is_grey else 3
-        emission = np.ascontiguousarray(surfaces.emission[:, :channels])
-        reflectance = np.ascontiguousarray(surfaces.reflectance[:, :channels])
-        radiosity, received = np.zeros((2, n, 3, channels))
+        weights, emission, reflectance = shine_of(surfaces)
+        radiosity, received = np.zeros((2, n, 3, len(weights)))
         radiosity[:, 0] = emission
-        received[:, 0] = _ambient(surfaces.area, emission, reflectance)
+        received[:, 0] = ambient(surfaces.area, emission, reflectance)
         return TransportState(
             surfaces=surfaces,
             tree=ElementTree(surfaces),
             links=LinkTable(),
-            weights=np.ones(1) if channels == 1 else LUMINANCE_WEIGHTS,
+            weights=weights,
             emission=emission,
             reflectance=reflectance,
             radiosity=radiosity,
@@ -87,8 +85,7 @@ class TransportState:
 
     def add_received(self, arrived: FloatArray, factor: float = 1.0) -> None:
         """Take in irradiance functions (n, 3, channels) as links bring them to their ends, times `factor`."""
-        push(self.tree.parent, self.tree.offset, arrived)
-        self.received += (factor * self.closure)[:, None, None] * arrived
+        take_in(self.tree.parent, self.tree.offset, self.closure, factor, arrived, self.received)
 
     def answering(self) -> FloatArray:
         """Radiosity functions (n, 3, channels) that answer what has been received; of leaves alone right."""
@@ -139,7 +136,17 @@ def linear_functions(tree: ElementTree, functions: FloatArray, elements: IntArra
     return found
 
 
-def _ambient(area: FloatArray, emission: Spectra, reflectance: Spectra) -> FloatArray:
+def shine_of(surfaces: Surfaces) -> tuple[FloatArray, Spectra, Spectra]:
+    """Luminance weights (channels,), emission and reflectance (p, channels); grey has one channel."""
+    channels = 1 if surfaces.is_grey else 3
+    return (
+        np.ones(1) if channels == 1 else LUMINANCE_WEIGHTS,
+        np.ascontiguousarray(surfaces.emission[:, :channels]),
+        np.ascontiguousarray(surfaces.reflectance[:, :channels]),
+    )
+
+
+def ambient(area: FloatArray, emission: Spectra, reflectance: Spectra) -> FloatArray:
     """Mean irradiance (channels,) of the scene if it were one well-mixed enclosure."""
     total = max(float(area.sum()), 1e-300)
     emitted = (area[:, None] * emission).sum(axis=0) / total
