@@ -16,9 +16,9 @@ from solver.geometry.surfaces import Surfaces
 from solver.kernels import inline_kernel, kernel
 from solver.parallel import run_chunks
 from solver.redistribution.matching import Match
-from solver.redistribution.reach import COMING, LEAVING, bounds_of, boxes_around, hull_meets, met_pairs
+from solver.redistribution.reach import bounds_of, boxes_around, hull_meets
 from solver.transport.state import TransportState
-from solver.types import ByteArray, FloatArray, IntArray
+from solver.types import FloatArray, IntArray
 
 _CHUNK: Final = 1 << 15
 
@@ -69,20 +69,15 @@ def owe(
     """
     links, tree = state.links, state.tree
     gone, fresh = match.gone, match.fresh
-    boxes = (
-        boxes_around(state.surfaces.corners[gone], state.surfaces.object[gone]),
-        boxes_around(surfaces.corners[fresh], surfaces.object[fresh]),
-    )
-    for box in boxes:
-        box[:, 0] -= margin
-        box[:, 1] += margin
-    met, bounds = met_pairs(tree, boxes), bounds_of(tree)
+    leaving = boxes_around(state.surfaces.corners[gone], state.surfaces.object[gone])
+    coming = boxes_around(surfaces.corners[fresh], surfaces.object[fresh])
+    for boxes in (leaving, coming):
+        boxes[:, 0] -= margin
+        boxes[:, 1] += margin
+    bounds = bounds_of(tree)
 
     def work(start: int, stop: int) -> None:
-        _owe(
-            links.p, links.q, tree.patch, bounds, met, boxes[LEAVING], boxes[COMING], number, drags, start,
-            stop, links.debt,
-        )  # fmt: skip
+        _owe(links.p, links.q, bounds, leaving, coming, number, drags, start, stop, links.debt)
 
     run_chunks(work, len(links), _CHUNK)
 
@@ -99,9 +94,7 @@ def _meets(first: FloatArray, second: FloatArray, boxes: FloatArray) -> bool:
 def _owe(
     p: IntArray,
     q: IntArray,
-    patch: IntArray,
     bounds: FloatArray,
-    met: ByteArray,
     leaving: FloatArray,
     coming: FloatArray,
     number: int,
@@ -120,9 +113,9 @@ def _owe(
             j = q[link]
             # Links in debt to a place that is left have never known it.
             knew = not (waits and drags)
-            if knew and met[LEAVING, patch[i], patch[j]] and _meets(bounds[i], bounds[j], leaving):
+            if knew and _meets(bounds[i], bounds[j], leaving):
                 owed = number
-            elif met[COMING, patch[i], patch[j]] and _meets(bounds[i], bounds[j], coming):
+            elif _meets(bounds[i], bounds[j], coming):
                 owed = -number
         if owed != debt[link]:
             debt[link] = owed
