@@ -16,6 +16,7 @@ from service.hosting.nursery import Nursery
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Sessions
 from service.journal.journal import Journal
+from service.journal.lights import Lights
 from service.json_body import BodyLimit
 from service.logs import RequestLog
 from service.metrics import Metrics, RequestMetrics
@@ -48,7 +49,8 @@ def create_app(settings: ServiceSettings | None = None, nursery: Nursery | None 
     pool = WorkerPool(source, chosen.pool_size, metrics.workers_lost.inc)
     lives = SessionMetrics(metrics.registry)
     journal = Journal(chosen.data_dir, lives.commits.observe)
-    sessions = Sessions(pool, journal, chosen.quotas, chosen.terms, lives)
+    lights = Lights(chosen.data_dir, chosen.max_light_bytes, chosen.max_kept_light_bytes)
+    sessions = Sessions(pool, journal, lights, chosen.quotas, chosen.terms, lives)
     lives.follow(sessions.count_by_state)
     metrics.sessions.set_function(lambda: len(sessions))
     metrics.warm_workers.set_function(lambda: pool.stock)

@@ -72,6 +72,15 @@ class ServiceSettings(BaseSettings):
     )
     max_sessions: _Count = Field(default=16, description="Sessions awake at once.")
     max_kept_sessions: _Count = Field(default=1000, description="Sessions in all, sleeping ones too.")
+    max_light_bytes: int = Field(
+        default=256 * 2**20,
+        ge=0,
+        description="Bytes of the solution of a session that are kept in the data directory, so that it need "
+        "not be solved anew; 0: none.",
+    )
+    max_kept_light_bytes: int = Field(
+        default=4 * 2**30, ge=0, description="Bytes of all solutions that are kept; the newest are."
+    )
     max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
     max_message_bytes: _Count = Field(default=4 * 2**20, description="Bytes of a message on a stream.")
     stream_idle_seconds: float = Field(

@@ -44,6 +44,9 @@ from solver.rendering.encoding import EncodingError
 REFUSED: Final = (SolverError, MemoryError)
 """What an engine raises on purpose, having changed nothing."""
 
+CHANGING: Final = (ApplyEdits, Configure, Redo, Undo)
+"""Requests after which the light is another one"""
+
 
 def answer(engine: Engine, request: AnyRequest) -> object:
     """Put a request to the engine. Raises one of REFUSED."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final, TypeAlias, TypeVar, cast
 
 from service.hosting.keeping import answer_text, digest_of, read_answer, settings_text, step_of
+from service.hosting.light_keeping import LightPlace
 from service.hosting.messages import ApplyEdits, EditsAnswer, Open, Redo, Request, Undo
 from service.hosting.remote import RemoteWorker, WorkerGoneError
 from service.hosting.reviving import Processes
@@ -67,12 +68,15 @@ class LastingWorker:
         take: Callable[[], Awaitable[RemoteWorker]],
         terms: Terms,
         metrics: SessionMetrics,
+        light: LightPlace | None = None,
     ) -> None:
-        """`take` gives a process that holds no session, or raises what tells why there is none."""
+        """`take` gives a process that holds no session, or raises what tells why there is none.
+        `light`: where that of the session is kept."""
         self._id = session_id
         self._journal = journal
         self._terms = terms
         self._metrics = metrics
+        self._light = light
         self._processes = Processes(self._opening, take, terms.wake_seconds, metrics)
         self._changing = asyncio.Lock()
         self._steps = 0
@@ -220,7 +224,7 @@ class LastingWorker:
     def _opening_of(self, whole: Whole) -> Open:
         recollection = _recollection(whole)
         limits, frame_limits = self._terms.scene_limits, self._terms.frame_limits
-        return Open(recollection.past(), recollection.settings, limits, frame_limits)
+        return Open(recollection.past(), recollection.settings, limits, frame_limits, self._light)
 
 
 def _recollection(whole: Whole) -> Recollection:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from service.hosting.light_keeping import LightPlace
 from service.hosting.pictures import Presentation
 from solver.document.edits import Edit
 from solver.document.fields import Location
@@ -48,6 +49,8 @@ class Open(Request[EngineStatus]):
     settings: LightSettings
     limits: SceneLimits
     frame_limits: FrameLimits
+    light: LightPlace | None = None
+    """Where its light is kept; None: nowhere"""
 
 
 @dataclass(frozen=True)

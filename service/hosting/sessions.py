@@ -8,7 +8,7 @@ import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from service.hosting.keeping import settings_text
@@ -18,6 +18,7 @@ from service.hosting.pool import WorkerPool
 from service.hosting.remote import RefusedError, RemoteWorker
 from service.journal.documents import Snapshot, text_of
 from service.journal.journal import Journal
+from service.journal.lights import Lights
 from service.journal.recollection import snapshot_of
 from service.journal.store import JournalError, Kept
 from service.session_metrics import SessionMetrics
@@ -124,10 +125,17 @@ class Sessions:
     """All sessions of the service."""
 
     def __init__(
-        self, pool: WorkerPool, journal: Journal, quotas: Quotas, terms: Terms, metrics: SessionMetrics
+        self,
+        pool: WorkerPool,
+        journal: Journal,
+        lights: Lights,
+        quotas: Quotas,
+        terms: Terms,
+        metrics: SessionMetrics,
     ) -> None:
         self._pool = pool
         self._journal = journal
+        self._lights = lights
         self._quotas = quotas
         self._terms = terms
         self._metrics = metrics
@@ -145,6 +153,7 @@ class Sessions:
         """Take in all sessions that are kept; they sleep. Raises JournalError."""
         for kept in await self._journal.run(lambda store: store.sessions()):
             self._by_id[kept.id] = Session(kept, self._worker(kept.id))
+        await asyncio.to_thread(self._lights.tidy, set(self._by_id))
 
     def find(self, session_id: str, owner: str | None = None) -> Session:
         """The session of that id, if it is that owner's, or anybody's where that is None.
@@ -172,12 +181,14 @@ class Sessions:
     async def _open(self, request: Open, owner: str) -> tuple[Session, EngineStatus]:
         await self._make_room()
         process = await self._pool.take()
+        name = secrets.token_hex(8)
         try:
             snapshot, status = await asyncio.gather(
-                asyncio.to_thread(_snapshot_text, request), process.call(request)
+                asyncio.to_thread(_snapshot_text, request),
+                process.call(replace(request, light=self._lights.place(name))),
             )
             settings = settings_text(status.settings)
-            kept = Kept(secrets.token_hex(8), owner, status.name, status.revision, settings, time.time())
+            kept = Kept(name, owner, status.name, status.revision, settings, time.time())
             await self._journal.run(lambda store: store.begin(kept, snapshot))
         except RefusedError:
             self._pool.give_back(process)
@@ -196,6 +207,7 @@ class Sessions:
         await self._journal.run(lambda store: store.forget(session_id))
         self._by_id.pop(session_id, None)
         await session.worker.end()
+        await asyncio.to_thread(self._lights.forget, session_id)
 
     async def tidy_forever(self) -> None:
         """Put sessions to sleep, and end them, as they become idle for too long."""
@@ -207,6 +219,7 @@ class Sessions:
                     await self._tidy(session)
                 except (JournalError, NoSuchSessionError) as failure:
                     _log.warning("session %s could not be tidied: %s", session.id, failure)
+            await asyncio.to_thread(self._lights.tidy, set(self._by_id))
 
     async def close(self) -> None:
         """End all processes; what is kept stays."""
@@ -232,7 +245,8 @@ class Sessions:
             await self._make_room(session_id)
             return await self._pool.take()
 
-        return LastingWorker(session_id, self._journal, take, self._terms, self._metrics)
+        light = self._lights.place(session_id)
+        return LastingWorker(session_id, self._journal, take, self._terms, self._metrics, light)
 
     async def _make_room(self, session_id: str | None = None) -> None:
         """See that one more session may be awake: that one, or a new one. Raises TooManySessionsError."""

@@ -14,7 +14,8 @@ import threading
 import time
 from typing import Final, NoReturn
 
-from service.hosting.answers import REFUSED, answer, refusal_of
+from service.hosting.answers import CHANGING, REFUSED, answer, refusal_of
+from service.hosting.light_keeping import LightKeeper
 from service.hosting.messages import (
     Abandon,
     Answer,
@@ -55,6 +56,7 @@ class Host:
         self._busy = False
         self._reported: EngineStatus | None = None
         self._report_due = 0.0
+        self._keeper = LightKeeper(None)
 
     def run(self) -> NoReturn:
         """Serve for ever: the reading thread ends the process."""
@@ -64,6 +66,7 @@ class Host:
             if self._engine is not None:
                 self._serve_waiting(self._engine)
                 self._work(self._engine)
+                self._keeper.keep(self._engine)
                 if not self._is_busy:
                     self._serve_waiting(self._engine)  # nothing will get better while this sleeps
 
@@ -84,10 +87,11 @@ class Host:
         return self._busy or any(waiting.is_working for waiting in self._waiting.values())
 
     def _spare_time(self) -> float | None:
-        """Seconds until a waiting request must be answered; None where none waits."""
-        if not self._waiting:
-            return None
-        return max(0.0, min(waiting.deadline for waiting in self._waiting.values()) - time.monotonic())
+        """Seconds until a waiting request must be answered, or light be kept; None: there is neither."""
+        times = [waiting.deadline for waiting in self._waiting.values()]
+        if self._keeper.due is not None:
+            times.append(self._keeper.due)
+        return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _serve(self, message: ToWorker) -> None:
         match message:
@@ -109,15 +113,20 @@ class Host:
     def _answer(self, request: AnyRequest) -> object:
         try:
             if self._engine is not None:
+                if isinstance(request, CHANGING):
+                    self._keeper.give_up()
                 return answer(self._engine, request)
             if isinstance(request, Open):
-                self._engine = Engine(
-                    request.scene, request.settings, request.limits, self._drawing, request.frame_limits
-                )
-                return self._engine.status()
+                return self._open(request)
             raise TypeError(f"{type(request).__name__} came before Open")
         except REFUSED as error:
             return refusal_of(error)
+
+    def _open(self, request: Open) -> EngineStatus:
+        self._keeper = LightKeeper(request.light)
+        limits, drawing, kept = request.limits, self._drawing, self._keeper.read()
+        self._engine = Engine(request.scene, request.settings, limits, drawing, request.frame_limits, kept)
+        return self._engine.status()
 
     def _serve_waiting(self, engine: Engine) -> None:
         """Answer what can be answered, or whose time is up."""
@@ -142,6 +151,7 @@ class Host:
         if self._engine is None:
             return
         status = self._engine.status()
+        self._keeper.note(status.state)
         if status != self._reported:
             self._reported = status
             self._end.send(StatusChanged(status))
