@@ -80,7 +80,7 @@ class LinkBatch:
 _COLUMNS: Final = tuple(column.name for column in fields(LinkBatch) if column.name != "blockers")
 """Names of what the table holds a row of for each link, as in `LinkBatch`."""
 
-_OWN: Final = (*_COLUMNS, "blocker_start", "debt")
+_OWN: Final = (*_COLUMNS, "blocker_start", "blocker_room", "debt")
 """All that there is of a link but its blockers."""
 
 
@@ -102,6 +102,7 @@ class LinkTable:
         self._residual_q = GrowingArray((), np.float64, capacity)
         self._blocker_count = GrowingArray((), np.int32, capacity)
         self._blocker_start = GrowingArray((), np.int64, capacity)
+        self._blocker_room = GrowingArray((), np.int32, capacity)
         self._debt = GrowingArray((), np.int32, capacity)
         self._pool = GrowingArray((), np.int32, capacity)
 
@@ -179,6 +180,11 @@ class LinkTable:
         return self._blocker_count.live
 
     @property
+    def blocker_room(self) -> IntArray:
+        """(n,) how many there is room for"""
+        return self._blocker_room.live
+
+    @property
     def debt(self) -> IntArray:
         """(n,) 0, or the number of the change of geometry that this link does not know of yet"""
         return self._debt.live
@@ -192,7 +198,7 @@ class LinkTable:
     def nbytes(self) -> int:
         """Bytes held."""
         columns: list[GrowingArray[Any]] = [getattr(self, f"_{name}") for name in _COLUMNS]
-        columns += [self._pool, self._blocker_start, self._debt]
+        columns += [self._pool, self._blocker_start, self._blocker_room, self._debt]
         return sum(column.nbytes for column in columns)
 
     def append(self, batch: LinkBatch) -> None:
@@ -201,13 +207,14 @@ class LinkTable:
         for name in _COLUMNS:
             getattr(self, f"_{name}").append(getattr(batch, name))
         self._blocker_start.append(start)
+        self._blocker_room.append(batch.blocker_count)
         self._debt.grow(len(start))
         self._pool.append(batch.blockers)
 
     def overwrite(self, rows: IntArray, batch: LinkBatch) -> None:
         """Put the links of `batch` in the place of `rows` (n,), one for one."""
         count = batch.blocker_count
-        room = self.blocker_count[rows]
+        room = self.blocker_room[rows]
         longer = np.where(count > room, count, 0)
         first = self._pool.extend(int(longer.sum()))
         start = np.where(
@@ -217,6 +224,7 @@ class LinkTable:
         for name in _COLUMNS:
             getattr(self, name)[rows] = getattr(batch, name)
         self.blocker_start[rows] = start
+        self.blocker_room[rows] = np.maximum(room, count)
         self.debt[rows] = 0
 
     def replace(self, gone: IntArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
@@ -235,7 +243,8 @@ class LinkTable:
         count = fresh["blocker_count"]
         start = len(self._pool) + np.cumsum(count, dtype=np.int64) - count
         filled = min(len(gone), len(count))
-        for name, column in (*fresh.items(), ("blocker_start", start), ("debt", np.zeros_like(count))):
+        own = {"blocker_start": start, "blocker_room": count, "debt": np.zeros_like(count)}
+        for name, column in (fresh | own).items():
             getattr(self, name)[gone[:filled]] = column[:filled]
             getattr(self, f"_{name}").append(column[filled:])
         self._pool.append(blockers)
@@ -331,6 +340,7 @@ class LinkTable:
             yield
         self._pool = pool
         self.blocker_start[:] = start
+        self.blocker_room[:] = count
 
 
 @kernel

@@ -15,6 +15,9 @@ R = TypeVar("R")
 SLICE: Final = 0.012
 """Seconds that a batch should take."""
 
+_SHORTEST: Final = 0.3
+"""Part of a slice that a batch may be made for, where there is not more time than that"""
+
 _FIRST: Final = 64.0
 _LEAST: Final = 8.0
 _MOST: Final = 32768.0
@@ -27,13 +30,15 @@ class Pace:
         self._cost = _FIRST
         self._away = 0.0
         self._left: float | None = None
+        self._until = 0.0
 
     def pause(self) -> None:
         """The work rests: the time until it goes on is no batch's."""
         self._left = time.perf_counter()
 
-    def resume(self) -> None:
-        """The work goes on."""
+    def resume(self, budget: float = 0.0) -> None:
+        """The work goes on, for `budget` seconds if that is not 0: the last batches of them are shorter."""
+        self._until = time.perf_counter() + budget
         if self._left is not None:
             self._away += time.perf_counter() - self._left
             self._left = None
@@ -44,8 +49,11 @@ class Pace:
         first = 0
         while first < len(costs):
             done = int(ends[first - 1]) if first else 0
-            last = max(first + 1, int(np.searchsorted(ends, done + self._cost, side="right")))
-            start = time.perf_counter() - self._away
+            now = time.perf_counter()
+            left = self._until - now
+            share = min(1.0, max(_SHORTEST, left / SLICE)) if left > 0.0 else 1.0
+            last = max(first + 1, int(np.searchsorted(ends, done + share * self._cost, side="right")))
+            start = now - self._away
             yield slice(first, last)
             seconds = time.perf_counter() - self._away - start
             rate = (int(ends[last - 1]) - done) / max(seconds, 1e-6)

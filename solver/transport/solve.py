@@ -213,7 +213,7 @@ class RadiositySolver(SlicedSolve):
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; True while more remains."""
-        self.pace.resume()
+        self.pace.resume(budget)
         try:
             return super().step(budget)
         finally:

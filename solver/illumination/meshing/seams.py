@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.grouping import settle, unite
@@ -35,6 +36,9 @@ _HALF_SPACE: Final = np.array([1.0, 0.6180339887, 0.3572065189])
 
 _ON_LINE: Final = 1e-6
 """A vertex is on an edge if its distance from the edge's line is at most this times the edge's length."""
+
+_MIXER: Final = np.uint64(0x9E3779B97F4A7C15)
+_HALF: Final = np.uint64(32)
 
 _APART: Final = 1e-6
 """Vertices on an edge are distinct if they are further apart than this times the edge's length."""
@@ -86,12 +90,25 @@ def _group(values: FloatArray) -> IntArray:
     """Numbers that are equal for rows of `values` (n, 6) that agree to about a step."""
     label = np.arange(len(values), dtype=np.int32)
     for shift in (_SHIFT, _SHIFT + 0.5):
-        rounded = np.floor(values / _STEP + shift).astype(np.int64)
-        order = np.lexsort(rounded.T)
-        differs = np.any(rounded[order[1:]] != rounded[order[:-1]], axis=1)
+        key = np.empty(len(values), dtype=np.uint64)
+        _hash_rounded(values, shift, key)
+        order = np.argsort(key)
+        differs = key[order[1:]] != key[order[:-1]]
         unite(order, differs, label)
     settle(label)
     return label
+
+
+@kernel
+def _hash_rounded(values: FloatArray, shift: float, key: NDArray[np.uint64]) -> None:
+    """A number (n,) for each row of `values` (n, 6), rounded; lines that have one by chance cost nothing."""
+    for i in range(len(values)):
+        mixed = np.uint64(0)
+        for k in range(values.shape[1]):
+            rounded = np.uint64(np.int64(np.floor(values[i, k] / _STEP + shift)))
+            mixed = (mixed ^ rounded) * _MIXER
+            mixed ^= mixed >> _HALF
+        key[i] = mixed
 
 
 @dataclass(frozen=True, eq=False)
