@@ -12,6 +12,7 @@ from starlette.middleware import Middleware
 from service import problems
 from service.config import ServiceSettings
 from service.context import Context, require_token
+from service.hosting.board import Board
 from service.hosting.nursery import Nursery
 from service.hosting.pool import WorkerPool
 from service.hosting.sessions import Sessions
@@ -46,7 +47,7 @@ def create_app(settings: ServiceSettings | None = None, nursery: Nursery | None 
     chosen = settings or ServiceSettings()
     metrics = Metrics()
     source = nursery or Nursery()
-    pool = WorkerPool(source, chosen.pool_size, metrics.workers_lost.inc)
+    pool = WorkerPool(source, Board(chosen.places), chosen.pool_size, metrics.workers_lost.inc)
     lives = SessionMetrics(metrics.registry)
     journal = Journal(chosen.data_dir, lives.commits.observe)
     lights = Lights(chosen.data_dir, chosen.max_light_bytes, chosen.max_kept_light_bytes)

@@ -16,6 +16,7 @@ from solver.document.limits import SceneLimits
 from solver.engine.requests import FrameLimits
 from solver.errors import LimitExceededError
 from solver.illumination.settings import LightSettings
+from solver.parallel import core_count
 
 _Count: TypeAlias = Annotated[int, Field(ge=1)]
 
@@ -71,6 +72,11 @@ class ServiceSettings(BaseSettings):
         default=30.0, gt=0.0, description="Longest wait for a session that is being brought back."
     )
     max_sessions: _Count = Field(default=16, description="Sessions awake at once.")
+    max_working: int = Field(
+        default=0,
+        ge=0,
+        description="Sessions that work on their light at once, in turns; 0: as many as there are cores.",
+    )
     max_kept_sessions: _Count = Field(default=1000, description="Sessions in all, sleeping ones too.")
     max_light_bytes: int = Field(
         default=256 * 2**20,
@@ -99,6 +105,11 @@ class ServiceSettings(BaseSettings):
     max_probe_points: _Count = Field(default=10_000, description="Points of a probe.")
     max_edits: _Count = Field(default=1000, description="Edits in a batch.")
     max_wait_ms: _Count = Field(default=600_000, description="Longest wait for a frame, whatever is asked.")
+
+    @property
+    def places(self) -> int:
+        """Sessions that work on their light at once."""
+        return self.max_working or core_count()
 
     @property
     def quotas(self) -> Quotas:

@@ -6,9 +6,9 @@ threads, and brings them back after a fork by itself.) A worker shares with the 
 of them writes to, which are most of what a process of its own would need.
 
 It reads requests from a socket, one for each worker that is wanted: a byte, with the socket that the worker
-is to serve. The answer is the worker's process id, with a descriptor of the process, by which whoever asked
-can wait for it and kill it, though it is no child of theirs. Where the other end hangs up, this process
-ends; workers end with their own sockets.
+is to serve and the board that it takes turns by. The answer is the worker's process id, with a descriptor
+of the process, by which whoever asked can wait for it and kill it, though it is no child of theirs. Where
+the other end hangs up, this process ends; workers end with their own sockets.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ def serve(link: socket.socket) -> NoReturn:
     try:
         link.sendall(READY)
         while True:
-            asked, descriptors, _, _ = socket.recv_fds(link, len(FORK), 1)
+            asked, descriptors, _, _ = socket.recv_fds(link, len(FORK), 2)
             if not asked:
                 break
-            _fork(link, descriptors[0])
+            _fork(link, *descriptors)
     except OSError:
         pass
     os._exit(0)
@@ -69,23 +69,24 @@ def _get_warm() -> None:
     gc.freeze()  # the collector of a worker would write to what it shares with the others
 
 
-def _fork(link: socket.socket, descriptor: int) -> None:
-    """Fork a worker that serves the socket of that descriptor, and tell of it."""
+def _fork(link: socket.socket, *descriptors: int) -> None:
+    """Fork a worker that is given those descriptors, and tell of it."""
     pid = fork()
     if pid == 0:
         link.close()
-        _work(descriptor)
-    os.close(descriptor)
+        _work(*descriptors)
+    for descriptor in descriptors:
+        os.close(descriptor)
     process = os.pidfd_open(pid)
     socket.send_fds(link, [PID.pack(pid)], [process])
     os.close(process)
 
 
-def _work(descriptor: int) -> NoReturn:
+def _work(*descriptors: int) -> NoReturn:
     """Be a worker."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        worker.main(descriptor)
+        worker.main(*descriptors)
     except Exception as failure:
         # Not told by the interpreter's end, which would begin with what the nursery has left open.
         traceback.print_exception(failure)

@@ -9,7 +9,7 @@ READY: Final = b"r"
 """Told once: from now on, workers can be asked for"""
 
 FORK: Final = b"f"
-"""Asks for a worker; with it goes the socket that the worker is to serve."""
+"""Asks for a worker; with it go the socket that the worker is to serve, and its board."""
 
 PID: Final = struct.Struct("!I")
 """Answers with a worker's process id; with it goes a descriptor of the process."""

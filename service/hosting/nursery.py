@@ -81,18 +81,20 @@ class Nursery:
                 forking.serve(theirs)
             self._process = DistantProcess(pid, os.pidfd_open(pid))
 
-    def worker(self, theirs: socket.socket) -> DistantProcess:
-        """A new worker that serves `theirs`. Blocks for a moment; for seconds while the nursery begins.
+    def worker(self, theirs: socket.socket, board: int) -> DistantProcess:
+        """A new worker that serves `theirs` and takes turns by `board`.
+
+        Blocks for a moment; for seconds while the nursery begins.
 
         Raises OSError where there is none.
         """
         with self._turn:
             if self._link is not None:
                 with contextlib.suppress(OSError):
-                    return self._ask(self._link, theirs)
+                    return self._ask(self._link, theirs, board)
                 _log.error("the process that workers are forked from has ended unexpectedly; it begins anew")
             self._end()
-            return self._ask(self._begin(), theirs)
+            return self._ask(self._begin(), theirs, board)
 
     def close(self) -> None:
         """End it. Workers go on."""
@@ -111,10 +113,10 @@ class Nursery:
         self._process = DistantProcess(pid, os.pidfd_open(pid))
         return self._link
 
-    def _ask(self, link: socket.socket, theirs: socket.socket) -> DistantProcess:
+    def _ask(self, link: socket.socket, theirs: socket.socket, board: int) -> DistantProcess:
         if not self._ready:
             self._ready = link.recv(len(READY)) == READY
-        socket.send_fds(link, [FORK], [theirs.fileno()])
+        socket.send_fds(link, [FORK], [theirs.fileno(), board])
         told, descriptors, _, _ = socket.recv_fds(link, PID.size, 1)
         if len(told) < PID.size or not descriptors:
             raise ConnectionError("the process that workers are forked from has ended")

@@ -7,6 +7,7 @@ import logging
 from collections import deque
 from collections.abc import Callable
 
+from service.hosting.board import Board
 from service.hosting.nursery import Nursery
 from service.hosting.remote import RemoteWorker, WorkerNotStartedError
 
@@ -16,9 +17,13 @@ _log = logging.getLogger(__name__)
 class WorkerPool:
     """A few workers that hold no session yet, ready or about to be."""
 
-    def __init__(self, nursery: Nursery, size: int, on_lost: Callable[[], None]) -> None:
-        """Keep `size` workers of `nursery`. `on_lost` is called for each that ends unexpectedly."""
+    def __init__(self, nursery: Nursery, board: Board, size: int, on_lost: Callable[[], None]) -> None:
+        """Keep `size` workers of `nursery`, which take turns by `board`.
+
+        `on_lost` is called for each that ends unexpectedly.
+        """
         self._nursery = nursery
+        self._board = board
         self._size = size
         self._on_lost = on_lost
         self._stock: deque[asyncio.Future[RemoteWorker]] = deque()
@@ -68,9 +73,10 @@ class WorkerPool:
             await asyncio.wait([coming])
             if _failure(coming) is None:
                 await coming.result().close()
+        self._board.close()
 
     async def _start(self) -> RemoteWorker:
-        return await RemoteWorker.start(self._nursery, self._on_lost)
+        return await RemoteWorker.start(self._nursery, self._board, self._on_lost)
 
     def _fill(self) -> None:
         """Start as many workers as are missing."""

@@ -7,16 +7,35 @@ import itertools
 import logging
 import socket
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
-from service.hosting.messages import Abandon, Answer, Call, Ready, Refusal, Request, StatusChanged
+from service.hosting.board import Board
+from service.hosting.messages import (
+    Abandon,
+    Answer,
+    ApplyEdits,
+    Call,
+    GetFrame,
+    GetPick,
+    Probe,
+    Ready,
+    Redo,
+    Refusal,
+    Request,
+    StatusChanged,
+    Undo,
+)
 from service.hosting.nursery import DistantProcess, Nursery
 from service.hosting.wire import WebEnd
-from solver.engine.status import EngineStatus
+from solver.engine.requests import WaitFor
+from solver.engine.status import EngineStatus, SessionState
 
 R = TypeVar("R")
 
 _log = logging.getLogger(__name__)
+
+_URGENT: Final = (ApplyEdits, GetPick, Probe, Redo, Undo)
+"""Requests that somebody waits for, beside frames"""
 
 
 class WorkerGoneError(Exception):
@@ -46,8 +65,11 @@ class RefusedError(Exception):
 class RemoteWorker:
     """One worker process, from its start to its end."""
 
-    def __init__(self, process: DistantProcess, end: WebEnd, on_lost: Callable[[], None]) -> None:
+    def __init__(
+        self, process: DistantProcess, end: WebEnd, board: Board, on_lost: Callable[[], None]
+    ) -> None:
         self._process = process
+        self._board = board
         self._end = end
         self._on_lost = on_lost
         self._numbers = itertools.count(1)
@@ -63,19 +85,19 @@ class RemoteWorker:
         """Why it cannot draw frames, if it cannot"""
 
     @classmethod
-    async def start(cls, nursery: Nursery, on_lost: Callable[[], None]) -> RemoteWorker:
+    async def start(cls, nursery: Nursery, board: Board, on_lost: Callable[[], None]) -> RemoteWorker:
         """Have a process forked, and wait until it is ready. Raises WorkerNotStartedError where it is not.
 
         `on_lost` is called when the process ends without having been closed.
         """
         ours, theirs = socket.socketpair()
         try:
-            process = await asyncio.to_thread(_born, nursery, theirs)
+            process = await asyncio.to_thread(_born, nursery, theirs, board.descriptor)
         except OSError as error:
             ours.close()
             _log.error("a worker could not be started: %s", error)
             raise WorkerNotStartedError from error
-        worker = cls(process, await WebEnd.over(ours), on_lost)
+        worker = cls(process, await WebEnd.over(ours), board, on_lost)
         try:
             ready = await worker._end.receive()
             if not isinstance(ready, Ready):
@@ -101,6 +123,7 @@ class RemoteWorker:
             raise WorkerGoneError
         number = next(self._numbers)
         answer = self._pending[number] = asyncio.get_running_loop().create_future()
+        leave = self._board.urgent() if self._is_urgent(request) else None
         try:
             await self._tell(Call(number, request))
             value = await answer
@@ -110,9 +133,18 @@ class RemoteWorker:
             raise
         finally:
             self._pending.pop(number, None)
+            if leave is not None:
+                leave()
         if isinstance(value, Refusal):
             raise RefusedError(value)
         return cast("R", value)
+
+    def _is_urgent(self, request: Request[Any]) -> bool:
+        """Whether it is served at once, where others do not work."""
+        if isinstance(request, GetFrame):
+            at_rest = self.status is not None and self.status.state is not SessionState.SOLVING
+            return at_rest or request.wait.until is WaitFor.NONE
+        return isinstance(request, _URGENT)
 
     async def news(self) -> None:
         """Return when the status has changed, or the worker has ended."""
@@ -161,6 +193,6 @@ class RemoteWorker:
         news.set()
 
 
-def _born(nursery: Nursery, theirs: socket.socket) -> DistantProcess:
+def _born(nursery: Nursery, theirs: socket.socket, board: int) -> DistantProcess:
     with theirs:
-        return nursery.worker(theirs)
+        return nursery.worker(theirs, board)

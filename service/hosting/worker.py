@@ -15,6 +15,7 @@ import time
 from typing import Final, NoReturn
 
 from service.hosting.answers import CHANGING, REFUSED, answer, refusal_of
+from service.hosting.board import Turn
 from service.hosting.light_keeping import LightKeeper
 from service.hosting.messages import (
     Abandon,
@@ -47,10 +48,13 @@ REPORT_INTERVAL: Final = 0.1
 class Host:
     """Serves the requests to one engine, and works on it in between."""
 
-    def __init__(self, end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker], drawing: Drawing) -> None:
+    def __init__(
+        self, end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker], drawing: Drawing, turn: Turn
+    ) -> None:
         self._end = end
         self._inbox = inbox
         self._drawing = drawing
+        self._turn = turn
         self._engine: Engine | None = None
         self._waiting: dict[int, Waiting] = {}
         self._busy = False
@@ -74,8 +78,9 @@ class Host:
         """What has come; where there is nothing else to do, this waits for it."""
         messages = []
         try:
-            if not self._is_busy:
-                messages.append(self._inbox.get(timeout=self._spare_time()))
+            timeout = self._turn.delay() if self._is_busy else self._spare_time()
+            if timeout != 0.0:
+                messages.append(self._inbox.get(timeout=timeout))
             while True:
                 messages.append(self._inbox.get_nowait())
         except queue.Empty:
@@ -142,7 +147,12 @@ class Host:
             self._end.send(Answer(number, value))
 
     def _work(self, engine: Engine) -> None:
-        was_busy, self._busy = self._busy, engine.step(SLICE)
+        was_busy = self._busy
+        if self._turn.delay() > 0.0:
+            self._busy = True  # for all that is known
+            return
+        self._busy = engine.step(SLICE)
+        self._turn.worked(self._busy)
         if self._busy != was_busy or (self._busy and time.monotonic() >= self._report_due):
             self._report()
 
@@ -165,11 +175,11 @@ def _read(end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker]) -> None:
     os._exit(0)
 
 
-def main(descriptor: int) -> NoReturn:
-    """Be a worker on the socket of that file descriptor, in a process of its own."""
+def main(descriptor: int, board: int) -> NoReturn:
+    """Be a worker on the socket of that file descriptor, with that board, in a process of its own."""
     end = WorkerEnd(socket.socket(fileno=descriptor))
     inbox: queue.SimpleQueue[ToWorker] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(end, inbox), name="halflight-reader", daemon=True).start()
     drawing = Drawing()
     end.send(Ready(drawing.problem))
-    Host(end, inbox, drawing).run()
+    Host(end, inbox, drawing, Turn(board)).run()

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from service.hosting.board import Board
 from service.hosting.nursery import DistantProcess, Nursery
 from tests.service.apps import NURSERY
 from tests.service.processes import children_of, eventually, is_running
+
+BOARD = Board(1)
 
 SWIFT = 1.0
 """Seconds in which a worker is there; a fork takes some hundredths."""
@@ -30,7 +33,7 @@ def nursery() -> Iterator[Nursery]:
 def worker_of(nursery: Nursery) -> tuple[DistantProcess, socket.socket]:
     ours, theirs = socket.socketpair()
     with theirs:
-        return nursery.worker(theirs), ours
+        return nursery.worker(theirs, BOARD.descriptor), ours
 
 
 def sockets_of(pid: int) -> set[str]:

@@ -271,7 +271,7 @@ def test_a_token_opens_its_own_sessions_alone() -> None:
 
 
 def test_a_worker_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nobody(self: Nursery, theirs: socket.socket) -> DistantProcess:
+    def nobody(self: Nursery, theirs: socket.socket, board: int) -> DistantProcess:
         raise ConnectionError
 
     monkeypatch.setattr(Nursery, "worker", nobody)
