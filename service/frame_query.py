@@ -48,7 +48,8 @@ class FrameQuery(CameraQuery, BoundedWait):
 
     renderer: RendererName | None = Field(
         default=None,
-        description="How it is drawn; by default the best that there is, which `X-Renderer` tells.",
+        description="How it is drawn; by default by interpolants. `auto`: by whichever has the least "
+        "estimated error by then, which `X-Renderer` tells; that is the default where there is a budget.",
     )
     format: FrameFormat | None = Field(
         default=None,
@@ -80,14 +81,18 @@ class FrameQuery(CameraQuery, BoundedWait):
         default=None,
         ge=0.0,
         allow_inf_nan=False,
-        description="The best frame that so much time allows, by as many paths as fit: "
-        "it comes sooner only if it is as good as `wait` asks, or within the tolerance.",
+        description="The best frame that so much time allows, drawing and encoding included: by whichever "
+        "renderer has the least estimated error by then, unless one is named. It comes sooner only if it is "
+        "as good as `wait` asks, or within the tolerance.",
     )
 
     def frame(self) -> FrameRequest:
         """What is to be drawn."""
         max_error = self.wait.max_error if self.wait.until is WaitFor.MAX_ERROR else math.inf
-        return FrameRequest(self.choice(), self.renderer, self.layer, self.samples, max_error)
+        renderer = self.renderer
+        if renderer is None and self.budget_ms is not None:
+            renderer = RendererName.AUTO
+        return FrameRequest(self.choice(), renderer, self.layer, self.samples, max_error)
 
     def encoding(self, chosen: FrameFormat) -> Encoding:
         """How it is to be turned into a file of that format."""

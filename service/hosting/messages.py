@@ -138,6 +138,8 @@ class GetFrame(Request[FrameAnswer]):
     """Frames of these tags need not be sent"""
     presentation: Presentation | None = None
     """How a stream shows it; None: as it is"""
+    is_budget: bool = False
+    """Whether the frame is to be drawn and encoded by then, not to be begun"""
 
 
 @dataclass(frozen=True)

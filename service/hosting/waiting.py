@@ -51,11 +51,18 @@ class WaitingFrame:
         self.deadline = time.monotonic() + request.timeout
 
     def poll(self, engine: Engine) -> FrameAnswer | None:
-        """The frame, if it is as good as asked or its time is up; drawing one takes what it takes."""
+        """The frame, if it is as good as asked or its time is up.
+
+        Where the time is a budget, drawing and encoding are to fit into it, by what they took before.
+        """
         worth = engine.outlook(drawn(engine, self._request)).is_worth(self._request.wait)
-        if not worth and time.monotonic() < self.deadline:
+        start = time.monotonic()
+        spare = engine.frame_times.expected if self._request.is_budget else 0.0
+        if not worth and start < self.deadline - spare:
             return None
-        return answer_frame(engine, self._request)
+        found = answer_frame(engine, self._request)
+        engine.frame_times.learn(time.monotonic() - start)
+        return found
 
 
 class WaitingOverlay:

@@ -61,6 +61,7 @@ async def session_frame(
         wait=query.waiting(),
         timeout=query.longest(float(context.settings.max_wait_ms)),
         known_tags=known_tags(if_none_match),
+        is_budget=query.budget_ms is not None,
     )
     answer = await unless_gone(request, session.worker.call(asked))
     context.metrics.frames.labels(answer.outlook.renderer).observe(answer.seconds)

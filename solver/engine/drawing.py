@@ -45,7 +45,7 @@ _FINE_LAYERS: Final = (LayerName.TRIANGLE, LayerName.BARYCENTRIC, LayerName.ERRO
 """Only interpolants have these."""
 
 _GATHERED_LAYERS: Final = (LayerName.RADIANCE, LayerName.IRRADIANCE, LayerName.ILLUMINANCE)
-_LIT_LAYERS: Final = (*_GATHERED_LAYERS, LayerName.FALSE_COLOUR)
+LIT_LAYERS: Final = (*_GATHERED_LAYERS, LayerName.FALSE_COLOUR)
 _LAYERS: Final = {LayerName(layer.value): layer for layer in Layer}
 
 
@@ -73,8 +73,8 @@ class Drawing:
             if layer not in _GATHERED_LAYERS:
                 raise NotAvailableError("layer of the gather renderer", layer, _GATHERED_LAYERS)
             return
-        if renderer is RendererName.VPL and layer not in _LIT_LAYERS:
-            raise NotAvailableError("layer of the vpl renderer", layer, _LIT_LAYERS)
+        if renderer is RendererName.VPL and layer not in LIT_LAYERS:
+            raise NotAvailableError("layer of the vpl renderer", layer, LIT_LAYERS)
         if renderer not in _SHADINGS:
             return
         if layer in _FINE_LAYERS and renderer is not RendererName.INTERPOLANT:

@@ -10,12 +10,14 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
+from solver.engine.auto import AutoView, FrameTimes, renderers_for
 from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.checkpoint import Checkpoint
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
@@ -40,6 +42,7 @@ from solver.engine.requests import (
     NotAvailableError,
     RendererName,
 )
+from solver.engine.seen import SeenErrors
 from solver.engine.solution import Solution
 from solver.engine.status import Change, ChangeState, EngineStatus, FineStatistics, ProbeResult, SessionState
 from solver.engine.views import (
@@ -100,6 +103,8 @@ class Engine:
         """Sets the tags of its frames apart from those that the session had in an earlier process"""
         self._turn = 0
         self._memory = Memory()
+        self._seen_errors = SeenErrors()
+        self.frame_times = FrameTimes()
         self._seen: Interpolants | None = None
         """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
@@ -333,6 +338,9 @@ class Engine:
         renderer = _renderer_of(request)
         camera = request.camera.resolve(self.scene)
         self._frame_limits.check(camera, request.samples)
+        if renderer is RendererName.AUTO:
+            names = renderers_for(request, self._solution)
+            return AutoView(tuple((name, self._view(replace(request, renderer=name))) for name in names))
         if renderer is RendererName.PATH:
             if request.layer is not LayerName.RADIANCE:
                 raise NotAvailableError("layer of the path renderer", request.layer, (LayerName.RADIANCE,))
@@ -346,7 +354,9 @@ class Engine:
             raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
         fine = self._fine_light()
         shown = RendererName.GOURAUD if renderer is RendererName.GATHER else renderer
-        view = SolutionView(self._solution, self._drawing, camera, shown, request.layer, request.samples)
+        view = SolutionView(
+            self._solution, self._drawing, self._seen_errors, camera, shown, request.layer, request.samples
+        )
         if renderer is RendererName.GATHER:
             return self._gather_view(fine, view)
         if renderer is not RendererName.INTERPOLANT or self._solution.is_sampled:
@@ -375,19 +385,17 @@ class Engine:
         return None if point is None else point.at_patches
 
     def _gather_view(self, fine: FineLight | None, coarse: SolutionView) -> GatherView:
-        if fine is None:
-            return GatherView(coarse, None, self._solution.error_estimate)
-        point = fine.prepare()
+        point = None if fine is None else fine.prepare()
         if point is None:
-            return GatherView(coarse, None, fine.gather_error, fine.failure is not None)
+            return GatherView(coarse, None, fine)
         if self._gathers is None:
             self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
-        return GatherView(coarse, self._gathers.ask(coarse.camera, coarse.samples), fine.gather_error)
+        return GatherView(coarse, self._gathers.ask(coarse.camera, coarse.samples), fine)
 
     def _outlook(self, request: FrameRequest, view: View) -> Outlook:
         return Outlook(
             tag=f"{self._life}.{self._turn}.{view.version}",
-            renderer=_renderer_of(request),
+            renderer=view.chosen[0] if isinstance(view, AutoView) else _renderer_of(request),
             revision=self._revision,
             error_estimate=view.error_estimate,
             converged=view.converged,

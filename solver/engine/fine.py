@@ -39,8 +39,9 @@ KEPT: Final = 4
 _FAILURES: Final = (SolverError, ArithmeticError, LookupError, MemoryError, RuntimeError, ValueError)
 """What libraries raise over geometry that they cannot bear; the solution itself is none the worse."""
 
-_GATHER_ERROR: Final = 0.6
-"""Error of point irradiance from a corrected solution, relative to the estimated error of the solution."""
+_GATHER_ERROR: Final = 0.8
+"""Error of point irradiance from a corrected solution over what a camera sees, relative to the estimated
+error of the solution: 0.3 in the median of many rooms, less than this in 19 of 20."""
 
 _FIRST: Final = 1e9
 """More pixels than any camera has."""
@@ -118,11 +119,10 @@ class FineLight:
         """What to draw; None until there is anything."""
         return None if self._interpolants is None else self._interpolants.mesh()
 
-    def error_estimate(self, camera: Camera) -> float:
-        """Relative error of the irradiance that `camera` sees, the solution's included."""
-        solution = self._solution.error_estimate
+    def interpolation_error(self, camera: Camera) -> float | None:
+        """Relative error that interpolants add to the irradiance that `camera` sees; None before any is."""
         seen = self._error_seen(camera)
-        return solution if seen is None else float(np.hypot(self.gather_error, seen.relative))
+        return None if seen is None else seen.relative
 
     def is_complete(self, camera: Camera) -> bool:
         """Whether all that `camera` sees is built, and no cell is to be split for it."""

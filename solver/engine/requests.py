@@ -38,6 +38,8 @@ class RendererName(StrEnum):
     GATHER = "gather"
     PATH = "path"
     """The path-traced check"""
+    AUTO = "auto"
+    """Whichever of them has the least estimated error by then"""
 
 
 class LayerName(StrEnum):

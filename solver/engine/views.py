@@ -6,6 +6,7 @@ choice between the two is made once, when the request is taken.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from solver.engine.gathers import GatherFrame
 from solver.engine.instant.frames import AskedInstant
 from solver.engine.paths import AskedFrame
 from solver.engine.requests import LayerName, RendererName, Wait
+from solver.engine.seen import SeenErrors, SeenLight
 from solver.engine.solution import Solution
 from solver.engine.status import SessionState
 from solver.engine.world import World
@@ -92,6 +94,7 @@ class SolutionView:
 
     solution: Solution
     drawing: Drawing
+    seen: SeenErrors
     camera: Camera
     renderer: RendererName
     layer: LayerName
@@ -104,8 +107,12 @@ class SolutionView:
 
     @property
     def error_estimate(self) -> float:
-        """Estimated relative error of the radiosity field."""
-        return self.solution.error_estimate
+        """Estimated relative error of the elements that the camera sees, shown as they are."""
+        return self.light().of_elements(self.solution.error_estimate)
+
+    def light(self) -> SeenLight:
+        """How the light that the camera sees differs from that of all surfaces."""
+        return self.seen.light(self.camera, self.solution)
 
     @property
     def converged(self) -> bool:
@@ -145,10 +152,12 @@ class InterpolantView:
 
     @property
     def error_estimate(self) -> float:
-        """Estimated relative error of what the camera sees, or of the field."""
-        if self.fine is None:
+        """Estimated relative error of what the camera sees."""
+        fine = self.fine
+        added = None if fine is None else fine.interpolation_error(self.coarse.camera)
+        if fine is None or added is None:
             return self.coarse.error_estimate
-        return self.fine.error_estimate(self.coarse.camera)
+        return min(1.0, math.hypot(self.coarse.light().of_field(fine.gather_error), added))
 
     @property
     def converged(self) -> bool:
@@ -184,9 +193,7 @@ class GatherView:
     """What is shown where time is up before there is anything else"""
     frame: GatherFrame | None
     """None while the solution is worked on"""
-    error: float
-    failed: bool = False
-    """Whether there will never be one"""
+    fine: FineLight | None
 
     @property
     def drawable(self) -> bool:
@@ -196,7 +203,9 @@ class GatherView:
     @property
     def error_estimate(self) -> float:
         """Estimated relative error of the light in it."""
-        return self.error
+        if self.fine is None or not self.drawable:
+            return self.coarse.error_estimate
+        return self.coarse.light().of_field(self.fine.gather_error)
 
     @property
     def converged(self) -> bool:
@@ -206,7 +215,8 @@ class GatherView:
     @property
     def improving(self) -> bool:
         """Until it is complete."""
-        return not self.drawable and not self.failed and self.coarse.solution.state is not SessionState.FAILED
+        failed = self.fine is not None and self.fine.failure is not None
+        return not self.drawable and not failed and self.coarse.solution.state is not SessionState.FAILED
 
     @property
     def version(self) -> str:

@@ -249,7 +249,7 @@ def _drawable(drawing: Drawing) -> Iterator[FrameRequest]:
     """Frames of every renderer and layer that there is."""
     for renderer in RendererName:
         for layer in LayerName:
-            if renderer is RendererName.PATH:
+            if renderer in (RendererName.PATH, RendererName.AUTO):
                 continue
             try:
                 drawing.require(renderer, layer)

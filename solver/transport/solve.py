@@ -199,6 +199,11 @@ class RadiositySolver(SlicedSolve):
         """Links shot over, those of all gathers included."""
         return (self._state.gathers - self._gathers_before) * len(self._state.links)
 
+    @property
+    def estimates(self) -> int:
+        """Times that all links have been asked for the error so far."""
+        return self._rounds
+
     def unshot_power(self) -> float:
         """W of luminance that leaves have received and not sent on."""
         state = self._state

@@ -102,8 +102,9 @@ def test_a_finer_tolerance_errs_less_and_takes_more(drawing: Drawing) -> None:
         complete(engine, large)
         fine = engine._fine
         assert fine is not None
-        told.append(fine.error_estimate(large.camera.resolve(engine.scene)))
-        assert np.sqrt(told[-1] ** 2 - fine.gather_error**2) <= error
+        added = fine.interpolation_error(large.camera.resolve(engine.scene))
+        assert added is not None and 0.0 < added <= error
+        told.append(added)
         points.append(engine.status().fine.point_irradiances)
     assert told[1] < told[0] and points[1] > 1.2 * points[0]
 
