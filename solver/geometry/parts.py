@@ -8,7 +8,7 @@ by bit what would be made anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from weakref import WeakKeyDictionary
@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from solver.geometry.faces import FacePatches, cross, split_faces
-from solver.geometry.scene import SceneObject
+from solver.geometry.scene import Material, SceneObject
 from solver.types import Corners, FloatArray, Int64Array, IntArray, ObjectId, Vector
 
 
@@ -70,7 +70,39 @@ def _make_part(source: SceneObject, scene_size: float) -> tuple[FacePatches, Par
     if source.transform.mirrors:
         faces = tuple(face[::-1] for face in faces)
     split = split_faces(source.world_vertices, faces, scene_size)
-    corners, count = split.corners, split.corner_count
+    told = _warnings(source.id, split.dropped, split.unfaithful)
+    kept = len(faces) - len(split.dropped)
+    return split, _assemble(source.material, split.corners, split.corner_count, split.face, kept, told)
+
+
+def cut_part(source: SceneObject, part: Part, left: Mapping[int, tuple[Corners, IntArray]]) -> Part:
+    """The part of `source` with fronts (keys of `left`) cut to pieces: corners (m, 4, 3), and how many (m,).
+
+    Faces that are cut away as a whole count as accepted all the same.
+    """
+    p = len(part.face) // (2 if source.material.two_sided else 1)
+    pieces = [left.get(k, (part.corners[k : k + 1], part.corner_count[k : k + 1])) for k in range(p)]
+    face = np.repeat(part.face[:p], [len(counts) for _, counts in pieces])
+    faces = len(np.unique(part.face[list(left)]))
+    told = f"object {source.id!r}: {_count(faces)} cut to what no other face in the same place covers"
+    return _assemble(
+        source.material,
+        np.concatenate([corners for corners, _ in pieces]),
+        np.concatenate([counts for _, counts in pieces]),
+        face,
+        part.face_count,
+        (*part.warnings, told),
+    )
+
+
+def _assemble(
+    material: Material,
+    corners: Corners,
+    count: IntArray,
+    face: IntArray,
+    face_count: int,
+    warnings: tuple[str, ...],
+) -> Part:
     p = len(count)
     is_triangle = count == 3
     # A triangle repeats its last corner, with which the product of diagonals would do, but for rounding.
@@ -83,8 +115,7 @@ def _make_part(source: SceneObject, scene_size: float) -> tuple[FacePatches, Par
     normal, area = doubled / length[:, None], 0.5 * length
     triangles, owner = _opaque_triangles(corners, count)
     back = np.full(len(owner), -1, dtype=np.int32)
-    face, side = split.face, np.zeros(p, dtype=np.int32)
-    material = source.material
+    side = np.zeros(p, dtype=np.int32)
     if material.two_sided:
         reverse = np.where(is_triangle[:, None], [[2, 1, 0, 0]], [[3, 2, 1, 0]])
         corners = np.concatenate([corners, np.take_along_axis(corners, reverse[:, :, None], axis=1)])
@@ -93,7 +124,7 @@ def _make_part(source: SceneObject, scene_size: float) -> tuple[FacePatches, Par
         side = np.repeat(np.array([0, 1], dtype=np.int32), p)
         back = owner + np.int32(p)
     total = len(count)
-    return split, Part(
+    return Part(
         corners=corners,
         corner_count=count,
         normal=normal,
@@ -107,8 +138,8 @@ def _make_part(source: SceneObject, scene_size: float) -> tuple[FacePatches, Par
         emission_exponent=np.full(total, material.emission_exponent, dtype=np.float64),
         triangles=triangles,
         triangle_patch=np.stack([owner, back], axis=-1),
-        face_count=len(faces) - len(split.dropped),
-        warnings=_warnings(source.id, split.dropped, split.unfaithful),
+        face_count=face_count,
+        warnings=warnings,
     )
 
 

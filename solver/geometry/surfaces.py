@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.geometry.parts import extent, part_of
+from solver import tolerances
+from solver.geometry.overlaps import cut_covered, find_covers
+from solver.geometry.parts import Part, cut_part, extent, part_of
 from solver.geometry.scene import Scene, SceneObject
 from solver.types import Corners, FloatArray, IntArray, ObjectId, Vector
 
@@ -87,7 +89,7 @@ def flatten(scene: Scene) -> Surfaces:
     """
     objects = list(scene)
     center, size = _bounds(objects)
-    parts = [part_of(o, size) for o in objects]
+    parts = _uncovered(objects, [part_of(o, size) for o in objects], center, size)
     counts = np.array([len(part.area) for part in parts], dtype=np.int64)
     # Triangles name patches of their own object, or none.
     first = np.repeat(np.cumsum(counts) - counts, [len(part.triangles) for part in parts])[:, None]
@@ -113,6 +115,27 @@ def flatten(scene: Scene) -> Surfaces:
         face_count=sum(part.face_count for part in parts),
         warnings=tuple(warning for part in parts for warning in part.warnings),
     )
+
+
+def _uncovered(objects: Sequence[SceneObject], parts: list[Part], center: Vector, size: float) -> list[Part]:
+    """The parts, without what lies beneath other faces in the same place."""
+    fronts = [int(np.count_nonzero(part.side == 0)) for part in parts]
+    shown = list(zip(parts, fronts, strict=True))
+    corners = _join([part.corners[:n] for part, n in shown], (0, 4, 3))
+    counts = _join_ids([part.corner_count[:n] for part, n in shown], (0,))
+    normals = _join([part.normal[:n] for part, n in shown], (0, 3))
+    two_sided = np.repeat([o.material.two_sided for o in objects], fronts).astype(np.bool_)
+    covered, cover = find_covers(corners, counts, normals, two_sided, center, size)
+    if len(covered) == 0:
+        return parts
+    left = cut_covered(corners, counts, normals, covered, cover, tolerances.TOUCH * size)
+    first = 0
+    for k, (part, n) in enumerate(shown):
+        own = {face - first: pieces for face, pieces in left.items() if first <= face < first + n}
+        if own:
+            parts[k] = cut_part(objects[k], part, own)
+        first += n
+    return parts
 
 
 def _bounds(objects: Sequence[SceneObject]) -> tuple[Vector, float]:

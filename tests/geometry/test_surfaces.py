@@ -15,8 +15,10 @@ from solver.geometry.surfaces import Surfaces, flatten
 from solver.geometry.transform import Transform
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-CONCAVE = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]]
+CONCAVE = [[0, 0, 1], [2, 0, 1], [2, 1, 1], [1, 1, 1], [1, 2, 1], [0, 2, 1]]
+"""Elsewhere, so that neither hides the other."""
 LINE = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+ABOVE = Transform.from_parts(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 0.0, 1.0]), np.ones(3))
 
 
 def thing(
@@ -95,7 +97,11 @@ def test_two_sided_faces_come_twice_and_block_once() -> None:
 
 
 def test_triangles_belong_to_the_patch_whose_front_they_show() -> None:
-    s = flattened(thing("a", SQUARE, two_sided=True), thing("b", CONCAVE), thing("c", SQUARE, two_sided=True))
+    s = flattened(
+        thing("a", SQUARE, two_sided=True),
+        thing("b", CONCAVE),
+        thing("c", SQUARE, two_sided=True, transform=ABOVE),
+    )
     edges = s.triangles[:, 1:] - s.triangles[:, :1]
     normal = np.cross(edges[:, 0], edges[:, 1])
     for column, sign in ((0, 1.0), (1, -1.0)):
@@ -142,7 +148,7 @@ def test_patches_are_what_their_corners_say(power: float, seed: int) -> None:
 
 @pytest.mark.parametrize(("lines", "told"), [(1, "1 face of zero area"), (3, "3 faces of zero area")])
 def test_dropped_faces_are_counted(lines: int, told: str) -> None:
-    s = flattened(thing("good", SQUARE), thing("bad", SQUARE, *[LINE] * lines))
+    s = flattened(thing("good", SQUARE), thing("bad", SQUARE, *[LINE] * lines, transform=ABOVE))
     assert s.face_count == 2 and s.patch_count == 2
     assert s.warnings == (f"object 'bad': {told} dropped (first: 1)",)
 

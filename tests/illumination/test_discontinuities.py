@@ -200,10 +200,9 @@ OUTLINE = unordered(
         solid("box", box((-0.5, -0.4, 0.0), (0.5, 0.4, 1.0))),
         solid("box", box((-0.5, -0.4, 0.0), (0.5, 0.4, 1.0)), without=[0]),
         solid("box", box((-0.5, -0.4, 0.0), (0.5, 0.4, 1.0)), triangulated=True),
-        polygon("rug", np.array([[-0.5, -0.4, 0], [0.5, -0.4, 0], [0.5, 0.4, 0], [-0.5, 0.4, 0]])),
         polygon("rug", np.array([[-0.5, -0.4, 0], [-0.5, 0.4, 0], [0.5, 0.4, 0], [0.5, -0.4, 0]])),
     ],
-    ids=["standing", "without-bottom", "of-triangles", "rug", "rug-face-down"],
+    ids=["standing", "without-bottom", "of-triangles", "rug-face-down"],
 )
 def test_contacts_are_the_outline_of_what_stands_there(standing: SceneObject) -> None:
     surfaces = surfaces_of(FLOOR, standing)

@@ -105,7 +105,7 @@ def test_a_chain_of_nearly_equal_lines_is_cut() -> None:
 
 
 def test_patches_share_no_set() -> None:
-    surfaces = surfaces_of(FLOOR, polygon("shelf", square(2.0, 0.0)))
+    surfaces = surfaces_of(FLOOR, polygon("under", square(2.0, 0.0, down=True)))
     found = segments(on_line(0.3, (-1, 0), (-1, 0)), np.array([0, 1]), ALL[:2])
     sets = group_discontinuities(surfaces, found)
     np.testing.assert_array_equal(sets.patch, [0, 1])

@@ -115,8 +115,9 @@ def test_light_alone_leaves_positions_and_outlines_as_they_are() -> None:
 
 
 def test_patches_are_known_by_object_and_rank() -> None:
-    before = flatten(Scene(objects={name: thing(name, 0) for name in "abc"}))
-    after = flatten(Scene(objects={name: thing(name, 0) for name in ("new", "c", "a", "bb")}))
+    before = flatten(Scene(objects={name: thing(name, k) for k, name in enumerate("abc")}))
+    places = {"new": 3, "c": 2, "a": 0, "bb": 1}
+    after = flatten(Scene(objects={name: thing(name, k) for name, k in places.items()}))
     n, new = 4, 8
     expected = np.concatenate([np.full(new, -1), np.arange(2 * n, 3 * n), np.arange(n), np.full(2 * n, -1)])
     np.testing.assert_array_equal(earlier_patches(after, before), expected)

@@ -85,16 +85,15 @@ def truth(name: str) -> tuple[float, float]:
 
 def fractions(pair: Pair, samples: int, copies: int = COPIES, blocked: bool = True) -> VisibleFractions:
     """Of `copies` of a pair."""
-    n = len(pair.first)
-    faces = (tuple(range(n)),) * copies + (tuple(range(n, n + len(pair.second))),) * copies
-    mesh = Mesh(np.concatenate([pair.first, pair.second]), faces)
-    s = flatten(Scene(objects={"all": SceneObject("all", mesh, Material(np.zeros(3), np.zeros(3)))}))
+    s = surfaces_of(pair.first, pair.second)
     tree = ElementTree(s)
+    both = np.repeat(np.arange(2, dtype=np.int32), copies)
     p = np.arange(copies, dtype=np.int32)
     world = surfaces_of(pair.first, pair.second, *([pair.blocker] if blocked else []))
     return visible_fractions(
-        rays_of(world), p, p + np.int32(copies), tree.corners, tree.corner_count, tree.area, tree.patch,
-        s.normal, tree.axes, tree.centroid, tree.moment, samples,
+        rays_of(world), p, p + np.int32(copies), tree.corners[both], tree.corner_count[both], tree.area[both],
+        tree.patch[both], s.normal, tree.axes, tree.centroid[both], tree.moment[both],
+        np.arange(2 * copies), samples,
     )  # fmt: skip
 
 

@@ -242,7 +242,7 @@ def test_a_screen_between_two_squares(screen: FloatArray, expected: tuple[int, s
 def test_two_halves_of_a_screen_hide_all_and_are_both_listed() -> None:
     """NONE is claimed for one polygon that hides all; two together are PARTIAL, and rays tell."""
     left = np.array([[-3.0, -3, 1], [0.01, -3, 1], [0.01, 3, 1], [-3, 3, 1]])
-    soup = soup_of([SQUARE, DOWN + np.array([0, 0, 2]), left, left + np.array([3.0, 0, 0])])
+    soup = soup_of([SQUARE, DOWN + np.array([0, 0, 2]), left, left + np.array([3.0, 0, 0.01])])
     assert single(soup) == (PARTIAL, {2, 3})
     assert fraction(soup, soup.polygon(0), soup.polygon(1), {2, 3}) == 0.0
 
