@@ -52,7 +52,9 @@ class Pace:
             now = time.perf_counter()
             left = self._until - now
             share = min(1.0, max(_SHORTEST, left / SLICE)) if left > 0.0 else 1.0
-            last = max(first + 1, int(np.searchsorted(ends, done + share * self._cost, side="right")))
+            # A float would have all of `ends` converted, every time.
+            most = done + int(share * self._cost)
+            last = max(first + 1, int(np.searchsorted(ends, most, side="right")))
             start = now - self._away
             yield slice(first, last)
             seconds = time.perf_counter() - self._away - start
