@@ -29,7 +29,7 @@ test: setup-dev ## run the tests, but for the slow ones (PYTEST_ARGS="-k name")
 test-all: setup-dev ## run all tests
 	$(PYTHON) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
 
-bench: setup ## measure speed against error, as a table (BENCH_ARGS="--help")
+bench: setup ## report speed against error into out/report (BENCH_ARGS="--full", "--help")
 	@$(PYTHON) -m benchmarks $(BENCH_ARGS)
 
 check: setup-dev ## lint, format, types and layers, without the tests

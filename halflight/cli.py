@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from halflight import bake, convert, info, render, serve, warm
+from halflight import bake, bench, convert, info, render, serve, warm
 from halflight.console import project_version
 
 app = typer.Typer(
@@ -27,6 +27,7 @@ app.command("render")(render.render)
 app.command("bake")(bake.bake)
 app.command("convert")(convert.convert)
 app.command("info")(info.info)
+app.command("bench", context_settings=bench.CONTEXT)(bench.bench)
 
 
 def _tell_version(wanted: bool) -> None:

@@ -135,7 +135,7 @@ def test_sections_measure_the_scenes_asked_for(quick: bool) -> None:
 
 def test_the_command_prints_a_table_and_writes_all_figures(tmp_path: Path) -> None:
     file = tmp_path / "figures.json"
-    done = bench("--only", "rays", "--quick", "--markdown", "--json", str(file))
+    done = bench("--only", "rays", "--markdown", "--json", str(file), "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "### Shadow rays a second" in done.stdout
     assert " of 1 targets met; measured in " in done.stdout.strip().splitlines()[-1]
@@ -147,7 +147,7 @@ def test_the_command_prints_a_table_and_writes_all_figures(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [(["--scenes", "attic"], "'attic' is none of cornell"), (["--only", "solve,all"], "'all' is none of")],
+    [(["--scenes", "attic"], "'attic' is none of cornell"), (["--only", "solve,none"], "'none' is none of")],
 )
 def test_the_command_refuses_what_it_does_not_know(arguments: list[str], message: str) -> None:
     done = bench(*arguments)
@@ -158,5 +158,5 @@ def test_the_command_refuses_what_it_does_not_know(arguments: list[str], message
 def test_the_command_explains_itself() -> None:
     done = bench("--help")
     assert done.returncode == 0
-    for option in ("--scenes", "--only", "--quick", "--markdown", "--json"):
+    for option in ("--scenes", "--only", "--full", "--out", "--markdown", "--json"):
         assert option in done.stdout
