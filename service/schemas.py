@@ -13,7 +13,7 @@ from solver.document.fields import Closed, Direction, Point
 from solver.document.models import SceneDocument
 from solver.document.settings import SettingsDocument
 from solver.engine.picking import PickResult
-from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
+from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState, Spared
 
 Triple: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
 """x, y, z or R, G, B that are told."""
@@ -35,6 +35,26 @@ class SessionRequest(Closed):
         default=None, description="What `GET …/snapshot` gave, in place of `scene`: a session with a history."
     )
     settings: SettingsDocument = SettingsDocument()
+
+
+class SavedWork(BaseModel):
+    """One saving."""
+
+    saving: str = Field(description="What `settings.in_full` switches off, or `coarse_links`.")
+    spared: int = Field(
+        description="How many channels, shadow tests of links, rays, discontinuities or interpolants; "
+        "how many links are not subdivided further."
+    )
+    of: int = Field(description="Out of how many.")
+    error_estimate: float = Field(
+        description="Relative error that this may cause; 0 where it makes no difference. Those of rays and "
+        "coarse links are parts of the session's `error_estimate`."
+    )
+
+    @classmethod
+    def of_engine(cls, spared: Spared) -> SavedWork:
+        """The wire's form of a saving."""
+        return cls(**asdict(spared))
 
 
 class SessionStatus(BaseModel):
@@ -60,6 +80,9 @@ class SessionStatus(BaseModel):
         description="Counts: `polygons`, `elements`, `links`, and more.",
         examples=[{"polygons": 16, "elements": 2412, "links": 30117}],
     )
+    savings: list[SavedWork] = Field(
+        default=[], description="What the scene did not need, and the error that leaving it out may cause."
+    )
     warnings: list[str]
     settings: SettingsDocument
     awake: bool = Field(
@@ -79,6 +102,7 @@ class SessionStatus(BaseModel):
             error_estimate=status.error_estimate,
             unshot_fraction=status.unshot_fraction,
             statistics=asdict(status.statistics) | asdict(status.fine),
+            savings=[SavedWork.of_engine(spared) for spared in status.savings],
             warnings=list(status.warnings),
             settings=SettingsDocument.describing(status.settings),
         )

@@ -10,7 +10,7 @@ from pydantic import Field
 from solver.document.fields import Closed
 from solver.illumination.particles.sights import MOST_RESOLUTION
 from solver.illumination.settings import Compensation, LightSettings
-from solver.transport.settings import Interleaving
+from solver.transport.settings import Interleaving, Saving
 
 _DEFAULTS = LightSettings()
 
@@ -44,6 +44,12 @@ class SettingsDocument(Closed):
         default=_DEFAULTS.interleaving,
         description="What comes first after an edit: `redistribute_first`, the object and its shadow, or "
         "`by_energy`, whatever moves more energy.",
+    )
+    in_full: tuple[Saving, ...] = Field(
+        default=_DEFAULTS.in_full,
+        max_length=16,
+        description="Savings that are not made, to see what they are worth: of `channels`, `shadow_tests`, "
+        "`rays`, `discontinuities` and `interpolants`.",
     )
     max_elements: _Count = Field(
         default=_DEFAULTS.max_elements, description="Elements after which refinement stops, with a warning."

@@ -42,6 +42,7 @@ from solver.engine.requests import (
     NotAvailableError,
     RendererName,
 )
+from solver.engine.savings import savings_of
 from solver.engine.seen import SeenErrors
 from solver.engine.solution import Solution
 from solver.engine.status import Change, ChangeState, EngineStatus, FineStatistics, ProbeResult, SessionState
@@ -63,6 +64,7 @@ from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
 from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
+from solver.transport.settings import Saving
 from solver.transport.solve import RadiositySolver
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
 
@@ -112,9 +114,11 @@ class Engine:
         self._drags = False
         self._is_behind = False
         """Whether the solution is that of an earlier world"""
+        self._halted: str | None = None
+        """What to tell where no work is done until the next change"""
         self._power: dict[ObjectId, float] = {}
         """W of luminance that left each object before the last transition"""
-        self._settle(World.of(standing), None, False, kept)
+        self._settle(World.of(standing, in_colour=_in_colour(self._settings)), None, False, kept)
 
     @property
     def scene(self) -> Scene:
@@ -164,18 +168,21 @@ class Engine:
         self._catch_up()
         if settings == self._settings:
             return
+        self._halted = None
         before, self._settings = self._settings, settings
         if settings.solves_as(before):
             self._fine, self._gathers, self._instant = None, None, None
             self._turn += 1
         else:
-            self._settle(self._world, self._solution, False)
+            self._settle(World.of(self.scene, self._world, _in_colour(settings)), self._solution, False)
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; False if nothing needed any.
 
         So, when it is False, whoever waits for something has seen what the last of the work came to.
         """
+        if self._halted is not None:
+            return False
         self._catch_up()
         solving = self._solution.state is SessionState.SOLVING
         refining = self._fine is not None and self._fine.step(0.5 * budget)
@@ -187,6 +194,14 @@ class Engine:
             tracing = self._instant.step(share, self._settings.error_tolerance) or tracing
         remembering = self._solution.step(0.5 * budget if tracing else budget)
         return busy or tracing or remembering
+
+    def halt(self, reason: str) -> None:
+        """Do no more work, and keep nothing that could be done without, until the next edit or settings.
+
+        The status tells `reason` as a warning; what was solving is paused.
+        """
+        self._halted = reason
+        self._memory = Memory()
 
     def build_everything(self) -> None:
         """Build the interpolants of all triangles, seen or not, once there are any."""
@@ -201,20 +216,26 @@ class Engine:
         return EngineStatus(
             name=self.scene.name,
             revision=self._revision,
-            state=solution.state,
+            state=self._state(),
             progress=solver.progress,
             error_estimate=solution.error_estimate,
             unshot_fraction=solver.unshot_fraction,
             statistics=solver.statistics(),
             fine=FineStatistics() if self._fine is None else self._fine.statistics(),
+            savings=savings_of(solution, self._fine),
             warnings=self._warnings(),
             settings=self._settings,
         )
 
+    def _state(self) -> SessionState:
+        state = self._solution.state
+        is_halted = self._halted is not None and state is SessionState.SOLVING
+        return SessionState.PAUSED if is_halted else state
+
     def _warnings(self) -> tuple[str, ...]:
         failure = None if self._fine is None else self._fine.failure
-        told = (*self.scene.notes, *self._solution.warnings)
-        return told if failure is None else (*told, failure)
+        told = (*self.scene.notes, *self._solution.warnings, failure, self._halted)
+        return tuple(warning for warning in told if warning is not None)
 
     def outlook(self, request: FrameRequest) -> Outlook:
         """What a frame drawn now would be.
@@ -400,7 +421,7 @@ class Engine:
             error_estimate=view.error_estimate,
             converged=view.converged,
             drawable=view.drawable,
-            improving=view.improving,
+            improving=view.improving and self._halted is None,
         )
 
     def _take(self, step: Step) -> tuple[Change, ...]:
@@ -408,7 +429,7 @@ class Engine:
 
         So a burst of edits costs one transition, and none waits for those before it.
         """
-        world = World.of(step.scene, self._world)
+        world = World.of(step.scene, self._world, _in_colour(self._settings))
         before = None
         moved, drags = _moved_alone(step), self._drags
         if not self._is_behind:
@@ -418,7 +439,7 @@ class Engine:
         elif moved != self._moved:
             drags, self._moved = False, None
         self._revision += 1
-        self._world, self._drags, self._is_behind = world, drags, True
+        self._world, self._drags, self._is_behind, self._halted = world, drags, True, None
         changes = self._changes(step, world)
         self._log.add(changes, before)
         return changes
@@ -462,6 +483,10 @@ def _moved_alone(step: Step) -> ObjectId | None:
     """The object that `step` moves, if it does nothing else."""
     deed = step.deeds[0] if len(step.deeds) == 1 else None
     return deed.object_id if deed is not None and deed.op == "move" else None
+
+
+def _in_colour(settings: LightSettings) -> bool:
+    return Saving.CHANNELS in settings.in_full
 
 
 def _renderer_of(request: FrameRequest) -> RendererName:

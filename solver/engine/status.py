@@ -54,6 +54,20 @@ class FineStatistics:
 
 
 @dataclass(frozen=True)
+class Spared:
+    """What one saving has left out so far."""
+
+    saving: str
+    spared: int
+    """Of whatever it leaves out: channels, links without rays, rays, discontinuities, triangles; links that are
+    not subdivided"""
+    of: int
+    """Of how many"""
+    error_estimate: float
+    """Relative error that it may cause"""
+
+
+@dataclass(frozen=True)
 class EngineStatus:
     """One moment of an engine."""
 
@@ -69,6 +83,7 @@ class EngineStatus:
     """Share of the radiosity that has been received and not yet passed on."""
     statistics: SolverStatistics
     fine: FineStatistics
+    savings: tuple[Spared, ...]
     warnings: tuple[str, ...]
     settings: LightSettings
 

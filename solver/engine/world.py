@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,9 +21,12 @@ class World:
     rays: RayScene
 
     @staticmethod
-    def of(scene: Scene, before: World | None = None) -> World:
-        """The world of `scene`; the ray hierarchy of the world `before` is kept where no triangle moved."""
-        surfaces = flatten(scene)
+    def of(scene: Scene, before: World | None = None, in_colour: bool = False) -> World:
+        """The world of `scene`; the ray hierarchy of the world `before` is kept where no triangle moved.
+
+        A scene without colours is lit in one channel, unless it is to be lit `in_colour`.
+        """
+        surfaces = replace(flatten(scene), in_colour=in_colour) if in_colour else flatten(scene)
         if before is not None and _same_triangles(surfaces, before.surfaces):
             return World(scene, surfaces, before.rays)
         return World(scene, surfaces, RayScene(surfaces.triangles, surfaces.center, surfaces.size))

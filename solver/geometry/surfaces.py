@@ -60,6 +60,9 @@ class Surfaces:
     """Accepted faces"""
     warnings: tuple[str, ...]
 
+    in_colour: bool = False
+    """Whether light is to be told in three channels even where all are equal"""
+
     @property
     def patch_count(self) -> int:
         """Number of patches."""
@@ -68,6 +71,8 @@ class Surfaces:
     @property
     def is_grey(self) -> bool:
         """Whether one channel tells all: reflectances and emission are equal over R, G and B."""
+        if self.in_colour:
+            return False
         triples = (self.reflectance, self.emission, self.specular)
         return all(bool(np.all(triple == triple[:, :1])) for triple in triples)
 

@@ -33,6 +33,16 @@ SAFETY: Final = 1.25
 """Factor on the estimate: errors that it does not know, such as of visibility that all rays agree on."""
 
 
+@dataclass(frozen=True)
+class ErrorParts:
+    """What the estimated relative error comes from; squares add up."""
+
+    coarseness: float = 1.0
+    """Links that are not subdivided"""
+    noise: float = 1.0
+    """Visibility that few rays tell"""
+
+
 @dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """Where the error is."""
@@ -53,6 +63,16 @@ class ErrorEstimate:
         if self.norm <= 0.0:
             return 0.0
         return min(1.0, SAFETY * float(np.sqrt(self.links.sum() / self.norm)))
+
+    @property
+    def parts(self) -> ErrorParts:
+        """The same by its causes; needs the norm."""
+        if self.norm <= 0.0:
+            return ErrorParts(0.0, 0.0)
+        noise, split = float(self.links[RESAMPLE].sum()), float(self.links[SPLIT_P].sum())
+        split += float(self.links[SPLIT_Q].sum())
+        coarseness, noise = (SAFETY * math.sqrt(part / self.norm) for part in (split, noise))
+        return ErrorParts(min(1.0, coarseness), min(1.0, noise))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,9 @@ from solver.geometry.surfaces import Surfaces
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkBatch, LinkTable, take_ranges
-from solver.transport.oracle import samples_needed
+from solver.transport.oracle import MAX_SAMPLES, samples_needed
 from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
+from solver.transport.settings import Saving
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
@@ -52,6 +53,8 @@ class Linker:
     """metres"""
     exchange_tolerance: float
     """relative error of an unoccluded exchange area"""
+    in_full: tuple[Saving, ...] = ()
+    """Of shadow tests and rays, what is not saved"""
 
     @staticmethod
     def of(surfaces: Surfaces, rays: RayScene, exchange_tolerance: float) -> Linker:
@@ -224,12 +227,17 @@ class Linker:
         run_chunks(work, n, _CHUNK, _LEAST)
         visibility = np.where(kind == NONE, 0.0, 1.0)
         samples, noise = np.zeros(n, dtype=np.int32), np.zeros(n)
-        partial = np.flatnonzero((kind == PARTIAL) & (open_exchange > 0.0))
+        tested = kind == PARTIAL
+        if Saving.SHADOW_TESTS in self.in_full:
+            tested[:] = True
+        partial = np.flatnonzero(tested & (open_exchange > 0.0))
         needed = np.empty(len(partial), dtype=np.int32)
         samples_needed(
             p[partial], q[partial], open_exchange[partial], tree.area, light.reflectance, light.radiosity,
             light.noise_limit, needed,
         )  # fmt: skip
+        if Saving.RAYS in self.in_full:
+            needed[:] = MAX_SAMPLES
         samples[partial] = np.maximum(needed, least_samples[partial])
         for count in np.unique(samples[partial]):
             part = partial[samples[partial] == count]

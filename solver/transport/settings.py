@@ -18,6 +18,21 @@ class Interleaving(StrEnum):
     """Whatever moves more energy ([G] strategy two)"""
 
 
+class Saving(StrEnum):
+    """Work that is left out where it would change nothing that counts."""
+
+    CHANNELS = "channels"
+    """A scene without colours is solved in one channel."""
+    SHADOW_TESTS = "shadow_tests"
+    """Pairs whose shaft holds no blocker, or is filled by one, are tested by no ray."""
+    RAYS = "rays"
+    """Links that matter little have their visibility told by few rays."""
+    DISCONTINUITIES = "discontinuities"
+    """Those that would not be seen are not meshed."""
+    INTERPOLANTS = "interpolants"
+    """What no camera sees gets none."""
+
+
 @dataclass(frozen=True)
 class SolverSettings:
     """Parameters of one radiosity solve."""
@@ -37,6 +52,8 @@ class SolverSettings:
     interleaving: Interleaving = Interleaving.REDISTRIBUTE_FIRST
     """[G "Interleaving redistribution and propagation shots"] The order of work after an edit; where it
     leads to is the same."""
+    in_full: tuple[Saving, ...] = ()
+    """What is not saved, to see that it changes nothing and what it would cost."""
     max_elements: int = 400_000
     """Elements (leaves and inner nodes) after which refinement stops with a warning."""
     max_links: int = 6_000_000

@@ -18,7 +18,7 @@ import numpy as np
 from solver.geometry.surfaces import Surfaces
 from solver.transport.closure import balance, is_closed
 from solver.transport.elements import ElementTree
-from solver.transport.estimate import estimate_error
+from solver.transport.estimate import ErrorEstimate, ErrorParts, estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light, Linker
 from solver.transport.pace import Pace
@@ -99,7 +99,8 @@ class RadiositySolver(SlicedSolve):
         """Set up the patches as the first elements; no light is moved yet. Or go on from a `state`."""
         super().__init__(surfaces, settings)
         self._rays = rays
-        self._linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
+        linker = Linker.of(surfaces, rays, min(1e-3, 0.05 * settings.error_tolerance))
+        self._linker = replace(linker, in_full=settings.in_full)
         self.pace = Pace()
         self._state = TransportState.of(surfaces) if state is None else state
         self._closed: bool | None = None
@@ -107,6 +108,8 @@ class RadiositySolver(SlicedSolve):
         self._rounds = 0
         self._handed: TransportState | None = None
         self._gathers_before = 0
+        self.error_parts = ErrorParts()
+        """Of the last estimate"""
         self.norm = 0.0
         """Squared luminance of what is reflected, times area, by the last estimate"""
         self._shape: _Leaves | None = None
@@ -254,7 +257,7 @@ class RadiositySolver(SlicedSolve):
                 yield from self._settle(target, strict=True)
             estimate = estimate_error(state)
             self.error_estimate = max(estimate.relative, cutoff or 0.0)
-            self.norm = estimate.norm
+            self.norm, self.error_parts = estimate.norm, estimate.parts
             self._rounds += 1
             self.version += 1
             self._report_progress()
@@ -268,15 +271,19 @@ class RadiositySolver(SlicedSolve):
                 if self.error_estimate > tolerance:
                     self.outcome = SolveOutcome.RELATIVE_CUTOFF
                 return
-            total = float(estimate.links.sum())
-            excess = total * (1.0 - (_AIM * tolerance / estimate.relative) ** 2) / _RESOLVED
-            choice = choose(state, estimate, self.settings, min(excess, _REFINE_SHARE * total))
+            choice = self._choose(estimate)
             if isinstance(choice, SolveOutcome):
                 self.outcome = choice
                 return
             self.bound = choice.bound
             yield True
             yield from self._refine(estimate.light, choice)
+
+    def _choose(self, estimate: ErrorEstimate) -> Choice | SolveOutcome:
+        """What to refine next; or why nothing can be done."""
+        total = float(estimate.links.sum())
+        excess = total * (1.0 - (_AIM * self.settings.error_tolerance / estimate.relative) ** 2) / _RESOLVED
+        return choose(self._state, estimate, self.settings, min(excess, _REFINE_SHARE * total))
 
     def _refine(self, light: Light, choice: Choice) -> Generator[bool, None, IntArray]:
         """Refine the chosen links; returns the rows of those that came for them."""

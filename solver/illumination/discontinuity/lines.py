@@ -10,13 +10,14 @@ import numpy as np
 
 from solver.illumination.discontinuity.activation import Activation, activate
 from solver.illumination.discontinuity.discontinuities import Discontinuities, find_discontinuities
-from solver.illumination.discontinuity.leaf_crossings import find_crossings
+from solver.illumination.discontinuity.leaf_crossings import LeafCrossings, find_crossings
 from solver.illumination.discontinuity.outlines import find_outlines
 from solver.illumination.discontinuity.sets import DiscontinuitySets, group_discontinuities
 from solver.illumination.meshing.cells import ConstraintEdges
 from solver.illumination.settings import LightSettings
 from solver.transport.field import RadiosityField
 from solver.transport.pushpull import means
+from solver.transport.settings import Saving
 from solver.transport.state import TransportState
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
 from solver.visibility.bvh import Hierarchy
@@ -24,6 +25,9 @@ from solver.visibility.bvh import Hierarchy
 WEIGHT: Final = 0.5
 """A discontinuity is meshed if without it irradiance would be wrong by this times the tolerance, relative to
 what the receiver and the scene have."""
+
+_NO_LIMIT: Final = 256
+"""Lines that a leaf may bear where none is left out"""
 
 _AT_ONCE: Final = 64
 """Receivers looked at between two yields."""
@@ -42,6 +46,8 @@ class Lines:
     activation: Activation
     edges: ConstraintEdges
     """What the triangulation must contain"""
+    left_out: float
+    """Relative RMS error of irradiance that quadratics may have for what is left out, by its weights"""
 
 
 def find_lines(
@@ -68,13 +74,15 @@ def find_lines(
     yield
     radiosity = means(state.tree, state.radiosity)[: state.tree.patch_count] @ state.weights
     weight = found.weights(radiosity, crossings.size)
-    least = settings.minimum_discontinuity_weight
+    least, most = settings.minimum_discontinuity_weight, settings.max_leaf_discontinuities
+    if Saving.DISCONTINUITIES in settings.in_full:
+        least, most = 0.0, _NO_LIMIT
     if least is None:
         relative = weight / _scale(field, surfaces.patch_count)[found.receiver]
         least = WEIGHT * settings.interpolation_tolerance
-        activation = activate(sets, crossings, relative, least, settings.max_leaf_discontinuities)
+        activation = activate(sets, crossings, relative, least, most)
     else:
-        activation = activate(sets, crossings, weight, least, settings.max_leaf_discontinuities)
+        activation = activate(sets, crossings, weight, least, most)
     made = activation.edges
     return Lines(
         discontinuities=found,
@@ -83,7 +91,19 @@ def find_lines(
         hardt_weight=found.hardt_weights(radiosity),
         activation=activation,
         edges=ConstraintEdges(made.patch, made.ends, made.set, made.jump),
+        left_out=_left_out(crossings, weight, activation, field),
     )
+
+
+def _left_out(
+    crossings: LeafCrossings, weight: FloatArray, activation: Activation, field: RadiosityField
+) -> float:
+    """Relative RMS error of all irradiance if each leaf errs by the heaviest line that it is without."""
+    entries = np.repeat(np.where(activation.active, 0.0, weight), np.diff(crossings.start))
+    worst = np.zeros(crossings.leaf_count)
+    np.maximum.at(worst, crossings.leaf, np.where(np.isfinite(entries), entries, 0.0))
+    light = float(field.area @ (field.irradiance @ LUMINANCE_WEIGHTS) ** 2)
+    return min(1.0, float(np.sqrt(field.area @ worst**2 / light))) if light > 0.0 else 0.0
 
 
 def _scale(field: RadiosityField, patches: int) -> FloatArray:
