@@ -29,10 +29,11 @@ def rank_links(
     reflectance: FloatArray,
     boxes: FloatArray,
     energy: FloatArray,
+    share: FloatArray,
     urgency: FloatArray,
 ) -> None:
-    """W (k,) of luminance that pairs of elements p, q (k,) reflect of each other's light, at most; and the
-    part of it that something can have hidden or shown, squared, over the area it falls on, (W/m2)^2 m2.
+    """W (k,) of luminance that pairs of elements p, q (k,) reflect of each other's light, at most; the share
+    (k,) of it that something can have hidden or shown; that, squared, over the area it falls on, (W/m2)^2 m2.
 
     exchange (k,) m2 where it is known, 0 where it is not: then the elements are taken for points, but for
     no more than the smaller one's area. boxes (n, 2, 3): what came or went between the ends; of none, all of
@@ -56,17 +57,18 @@ def rank_links(
             slack = 0.25 * np.sqrt(spread)
             far = (max(cos_i, 0.0) + slack) * (max(cos_j, 0.0) + slack) / (np.pi * (square + spread) ** 2)
             g = min(area[i], area[j], area[i] * area[j] * far)
-        share = 1.0 if len(boxes) == 0 else 0.0
+        hidden = 1.0 if len(boxes) == 0 else 0.0
         for box in range(len(boxes)):
-            share = max(
-                share,
+            hidden = max(
+                hidden,
                 _share_hidden(
                     centroid[i], centroid[j], square, area[i], area[j], boxes[box, 0], boxes[box, 1]
                 ),
             )
+        share[k] = hidden
         energy[k] = g * (radiosity[i] * reflectance[j] + radiosity[j] * reflectance[i])
         urgency[k] = link_weight(
-            g * share, area[i], area[j], reflectance[i], reflectance[j], radiosity[i], radiosity[j]
+            g * hidden, area[i], area[j], reflectance[i], reflectance[j], radiosity[i], radiosity[j]
         )
 
 

@@ -27,12 +27,12 @@ from solver.redistribution.matching import Match, match_patches
 from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, unneeded
-from solver.transport.estimate import Residuals
+from solver.transport.estimate import SAFETY, Residuals, estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.pace import steps
-from solver.transport.pushpull import gather
+from solver.transport.pushpull import gather, means
 from solver.transport.refine import NOISE_SHARE, Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -67,6 +67,13 @@ _GROWN: Final = 1.02
 _CREEP: Final = 1.15
 """The same for all links."""
 
+_IDLE: Final = 1e-3
+"""Share of the squared error that may be left to links of which nobody finds out what they see now: they have
+it as noise"""
+
+_FAINT: Final = 0.1
+"""The same of one of them, of what is refined"""
+
 _FOLDED: Final = 0.03
 """Elements without links are folded back when they are more than this share of all."""
 
@@ -81,6 +88,8 @@ class _Plan:
     """(n,) number of the edit"""
     energy: FloatArray
     """(n,) at stake, W of luminance"""
+    doubt_of_each: FloatArray
+    """(n,) squared error of the visible fraction that a link is left to, 0 where it is traced"""
     left: FloatArray
     """(n + 1,) sum of this and all later energies"""
     doubt: float
@@ -142,6 +151,7 @@ class Redistribution(RadiositySolver):
                 boxes_around(surfaces.corners[match.fresh], surfaces.object[match.fresh]),
             ]
         )
+        self._boxes += margin * np.array([[-1.0], [1.0]])
         self.trace: Trace = Trace.after(before, match, carried)
         """What has happened since the last solution that somebody looked at closely"""
         self._guess = self._state.received[self._fresh, 0].copy()
@@ -210,15 +220,16 @@ class Redistribution(RadiositySolver):
         self._arrived = np.zeros_like(state.received)
         coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         # What has been shot is as uncertain as what has not, until it is propagated.
-        self.error_estimate = min(1.0, math.hypot(self._known_error, plan.doubt))
+        self.error_estimate = min(1.0, math.hypot(self._known_error, SAFETY * plan.doubt))
         changed, faded = [], []
         since = 0
         old = len(state.links)
         yield True
         for part in self.pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
-            seen = plan.rows[part][plan.rows[part] >= 0]
+            is_link = plan.rows[part] >= 0
+            seen, doubt = plan.rows[part][is_link], plan.doubt_of_each[part][is_link]
             left = seen[state.links.debt[seen] > 0]
-            changed.append(self._look_again(seen, plan.light, moments))
+            changed.append(self._look_again(seen, doubt, plan.light, moments))
             faded.append(np.intersect1d(changed[-1], left, assume_unique=True))
             paired = int((plan.rows[part] < 0).sum())
             self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], coarse, moments)
@@ -233,7 +244,8 @@ class Redistribution(RadiositySolver):
             if self._is_propagations_turn(share, since):
                 since = 0
                 self._take_in()
-                if self.unshot_power() > float(plan.left[part.stop]):
+                few = len(plan.energy) - part.stop < _SHOTS_A_GATHER * len(state.links)
+                if not few and self.unshot_power() > float(plan.left[part.stop]):
                     moments = yield from self._propagate()
         self._take_in()
         self._arrived = self._moments = None
@@ -302,6 +314,7 @@ class Redistribution(RadiositySolver):
             rows = yield from self._refine(residuals.light, choice)
             rows.sort()
             residuals = residuals.grown(state, rows)
+        yield from self._refine_beyond()
         gone = unneeded(state.tree, state.links)
         if gone.sum() > _FOLDED * len(gone):
             self.trace.keep(np.flatnonzero(~gone).astype(np.int32))
@@ -309,15 +322,24 @@ class Redistribution(RadiositySolver):
             self.version += 1
             yield True
 
+    def _refine_beyond(self) -> Iterator[bool]:
+        """Refine what else is needed by the light that has arrived, so that it is settled but once."""
+        estimate = estimate_error(self._state)
+        yield True
+        if self.settings.error_tolerance < estimate.relative:
+            choice = self._choose(estimate)
+            if isinstance(choice, Choice):
+                yield from self._refine(estimate.light, choice)
+
     def _make_plan(self) -> _Plan:
         """All debts, the most urgent first; `_unlinked` gets into that order too."""
         state, pairs = self._state, self._unlinked
         links, tree = state.links, state.tree
         rows = np.flatnonzero(links.debt).astype(np.int32)
-        radiosity = np.maximum(self._known_moments()[:, 0] @ state.weights, 0.0)
+        radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
         reflectance = (state.reflectance @ state.weights)[tree.patch]
         p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
-        energy, urgency = np.empty((2, len(p)))
+        energy, share, urgency = np.empty((3, len(p)))
         known = np.abs(links.debt[rows]) == self._number
         # What hides links that are in debt to earlier edits is not known any more.
         for chosen, boxes in (
@@ -325,17 +347,19 @@ class Redistribution(RadiositySolver):
             (np.append(np.flatnonzero(~known), np.arange(len(rows), len(p))), self._boxes[:0]),
         ):
             exchange = np.append(links.open_exchange[rows], np.zeros(len(pairs)))[chosen]
-            found = np.empty((2, len(chosen)))
+            found = np.empty((3, len(chosen)))
             rank_links(
                 p[chosen], q[chosen], exchange, tree.area, tree.centroid, tree.patch, self.surfaces.normal,
-                radiosity, reflectance, boxes, found[0], found[1],
+                radiosity, reflectance, boxes, found[0], found[1], found[2],
             )  # fmt: skip
-            energy[chosen], urgency[chosen] = found
+            energy[chosen], share[chosen], urgency[chosen] = found
         # What an emitter sends out that came with the edit is what everybody looks at.
         first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
         first[self._fresh] = state.emission[self._fresh].any(axis=1)
         lit = first[tree.patch[p]] | first[tree.patch[q]]
         order = np.lexsort((-urgency, ~lit))
+        faint = np.cumsum(urgency[order][::-1])[::-1] < _IDLE * self.settings.error_tolerance**2 * self.norm
+        faint &= urgency[order] < _FAINT * self.bound
         paired = order[order >= len(rows)] - len(rows)
         self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
         self._plan = _Plan(
@@ -343,17 +367,27 @@ class Redistribution(RadiositySolver):
             rows=np.concatenate([rows, np.full(len(pairs), -1, dtype=np.int32)])[order],
             debt=np.concatenate([links.debt[rows], pairs.debt])[order],
             energy=energy[order],
+            doubt_of_each=np.where(faint, share[order] ** 2, 0.0),
             left=np.append(np.cumsum(energy[order][::-1])[::-1], 0.0),
             light=Light(radiosity, reflectance, NOISE_SHARE * self.bound),
         )
         return self._plan
 
-    def _look_again(self, rows: IntArray, light: Light, moments: FloatArray) -> IntArray:
-        """Let links shoot what they have changed by. Returns the rows (m,) that have changed."""
+    def _look_again(self, rows: IntArray, doubt: FloatArray, light: Light, moments: FloatArray) -> IntArray:
+        """Let links shoot what they have changed by. Returns the rows (m,) that have changed.
+
+        Where their visible fraction may err by the root of `doubt` (k,), it is not told anew unless it is 0.
+        """
         if len(rows) == 0:
             return rows
         links = self._state.links
-        changed, fresh = self._linker.renew(self._state.tree, links, rows, self.recent, self._near, light)
+        told = np.abs(links.debt[rows]) == self._number
+        renewed = self._linker.renew(
+            self._state.tree, links, rows, self.recent, self._near, light, self._boxes, told, doubt > 0.0
+        )
+        links.noise[rows[renewed.left]] += doubt[renewed.left]
+        links.relist(renewed.relisted, renewed.blocker_count, renewed.blockers)
+        changed, fresh = renewed.changed, renewed.batch
         exchange = links.open_exchange[changed] * links.visibility[changed]
         self._shoot(
             fresh,

@@ -15,10 +15,10 @@ import numpy as np
 
 from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
-from solver.transport.subdivision import count_children, make_children, place_elements
-from solver.types import BoolArray, Corners, FloatArray, IntArray, Points
+from solver.transport.subdivision import count_children, make_children, place_elements, place_keys
+from solver.types import BoolArray, Corners, FloatArray, Int64Array, IntArray, Points
 
-_COPIED: Final = ("corners", "corner_count", "child_count", "area", "centroid", "moment", "offset")
+_COPIED: Final = ("corners", "corner_count", "child_count", "area", "centroid", "moment", "offset", "key")
 """What a patch's elements keep when others come and go; the rest are numbers of patches and elements."""
 
 
@@ -43,6 +43,7 @@ class ElementTree:
         self._centroid = GrowingArray((3,), np.float64, room)
         self._moment = GrowingArray((3,), np.float64, room)
         self._offset = GrowingArray((2,), np.float64, room)
+        self._key = GrowingArray((), np.int64, room)
         self._corners.append(surfaces.corners)
         self._corner_count.append(surfaces.corner_count)
         self._patch.append(np.arange(n, dtype=np.int32))
@@ -50,7 +51,7 @@ class ElementTree:
         self._child.append(np.full(n, -1, dtype=np.int32))
         self._child_count.grow(n)
         self._area.append(surfaces.area)
-        for array in (self._centroid, self._moment, self._offset):
+        for array in (self._centroid, self._moment, self._offset, self._key):
             array.grow(n)
         self._place(0)
 
@@ -108,6 +109,11 @@ class ElementTree:
         return self._offset.live
 
     @property
+    def key(self) -> Int64Array:
+        """(n,) told from where an element is: what its rays go by, whatever number it has"""
+        return self._key.live
+
+    @property
     def leaves(self) -> IntArray:
         """Indices of the leaves, ascending."""
         return np.flatnonzero(self.child < 0).astype(np.int32)
@@ -128,6 +134,7 @@ class ElementTree:
                 self._centroid,
                 self._moment,
                 self._offset,
+                self._key,
             )
         )
 
@@ -149,6 +156,7 @@ class ElementTree:
             self._centroid,
             self._moment,
             self._offset,
+            self._key,
         ):
             array.grow(total)
         self._child.grow(total)[...] = -1
@@ -215,6 +223,7 @@ class ElementTree:
         number, none = np.arange(k, dtype=np.int32), np.full(k, -1, dtype=np.int32)
         place_elements(corners, self.corner_count[patches], number, none, axes, 0, centroid, moment, offset)
         self.centroid[patches], self.moment[patches] = centroid, moment
+        self.key[patches] = place_keys(centroid)
 
     def _place(self, start: int) -> None:
         """Find centroids, moments and offsets of the elements from `start` on."""
@@ -222,6 +231,7 @@ class ElementTree:
             self.corners, self.corner_count, self.patch, self.parent, self.axes, start, self.centroid,
             self.moment, self.offset,
         )  # fmt: skip
+        self.key[start:] = place_keys(self.centroid[start:])
 
 
 def plane_axes(normals: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ from solver.transport.settings import Saving
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
-from solver.visibility.fraction import visible_fractions
+from solver.visibility.fraction import rays_through, visible_fractions
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import NONE, PARTIAL
 
@@ -40,6 +40,24 @@ class Light:
     """(n,)"""
     noise_limit: float
     """squared error times area, (W/m2)^2 m2, that the sampling of one link's visibility may leave"""
+
+
+@dataclass(frozen=True, eq=False)
+class Renewed:
+    """What has become of links that have been looked at again."""
+
+    changed: IntArray
+    """(m,) rows that are different"""
+    batch: LinkBatch
+    """(m,) what they are"""
+    relisted: IntArray
+    """(k,) rows that have other blockers, though all their rays go where they went"""
+    blocker_count: IntArray
+    """(k,)"""
+    blockers: IntArray
+    """all lists of those, one after the other"""
+    left: Int64Array
+    """(l,) which of the links asked for have been left to what they saw"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +154,16 @@ class Linker:
         recent: BoolArray,
         near: Hierarchy,
         light: Light,
-    ) -> tuple[IntArray, LinkBatch]:
+        boxes: FloatArray,
+        told: BoolArray,
+        faint: BoolArray,
+    ) -> Renewed:
         """Links of `rows` (n,) as they are now that patches have come and gone.
 
         recent (p,): patches that came, which are in the hierarchy `near`. Those that went are -1 among the
-        blockers, or are there again, elsewhere. Returns the rows (m,) that are different, and what they are.
+        blockers, or are there again, elsewhere. Of rows that are `told` (n,), all that can make a difference
+        is in `boxes` (k, 2, 3), metres: a link none of whose rays goes there sees what it saw. So do those
+        that are `faint` (n,), as far as anybody cares, if they saw a part and see one.
         """
         s, h = self.surfaces, near
         p, q = links.p[rows], links.q[rows]
@@ -159,16 +182,36 @@ class Linker:
             )  # fmt: skip
 
         run_chunks(work, n, _CHUNK, _LEAST)
-        known = np.flatnonzero(kind <= NONE)
+        samples = links.samples[rows]
+        sampled = (kind == PARTIAL) & (before == PARTIAL) & (samples > 0)
+        stays = sampled & faint
+        left = np.flatnonzero(stays)
+        may_stay = np.flatnonzero(sampled & told & ~faint)
+        stays[may_stay] = ~rays_through(
+            self.rays, boxes, p[may_stay], q[may_stay], tree.corners, tree.corner_count, tree.area,
+            tree.patch, s.normal, tree.axes, tree.centroid, tree.key, samples[may_stay],
+        )  # fmt: skip
+        known = np.flatnonzero((kind <= NONE) & ~stays)
         pool = take_ranges(loose, room[known], kept[known])
-        least = np.ones(len(known), dtype=np.int32)
-        batches = [
-            self._evaluate(tree, p[known], q[known], kind[known], kept[known], pool, least, light, True)
-        ]
+        # By the same rays as before, so that only what has changed makes a difference.
+        least = np.where(sampled, samples, 1)[known].astype(np.int32)
+        batch = self._evaluate(tree, p[known], q[known], kind[known], kept[known], pool, least, light, True)
+        same = sampled[known] & (batch.samples == samples[known])
+        same &= batch.visibility == links.visibility[rows[known]]
+        batches = [batch.chosen(np.flatnonzero(~same))]
         unknown = np.flatnonzero(kind == UNKNOWN)
         if len(unknown):
             batches.append(self.link(tree, p[unknown], q[unknown], light, keep_dark=True))
-        return rows[np.concatenate([known, unknown])], LinkBatch.joined(batches)
+        stays[known[same]] = True
+        alike = np.flatnonzero(stays)
+        return Renewed(
+            changed=rows[np.concatenate([known[~same], unknown])],
+            batch=LinkBatch.joined(batches),
+            relisted=rows[alike],
+            blocker_count=kept[alike],
+            blockers=take_ranges(loose, room[alike], kept[alike]),
+            left=left,
+        )
 
     def link_children(
         self,
@@ -243,7 +286,7 @@ class Linker:
             part = partial[samples[partial] == count]
             found = visible_fractions(
                 self.rays, p[part], q[part], tree.corners, tree.corner_count, tree.area, tree.patch,
-                self.surfaces.normal, tree.axes, tree.centroid, tree.moment, int(count),
+                self.surfaces.normal, tree.axes, tree.centroid, tree.moment, tree.key, int(count),
             )  # fmt: skip
             seen = found.visibility
             visibility[part] = seen

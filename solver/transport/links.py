@@ -21,6 +21,9 @@ from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 _POOLED: Final = 1 << 21
 """Entries of blocker lists copied between two yields."""
 
+_TRIM: Final = 1.0625
+"""Entries of blocker lists that may be kept of those that are needed, when all else is given back"""
+
 _LEAST_POOL: Final = 1 << 16
 """Entries of blocker lists below which tidying is not worth it."""
 
@@ -213,19 +216,22 @@ class LinkTable:
 
     def overwrite(self, rows: IntArray, batch: LinkBatch) -> None:
         """Put the links of `batch` in the place of `rows` (n,), one for one."""
-        count = batch.blocker_count
+        self.relist(rows, batch.blocker_count, batch.blockers)
+        for name in _COLUMNS:
+            getattr(self, name)[rows] = getattr(batch, name)
+        self.debt[rows] = 0
+
+    def relist(self, rows: IntArray, count: IntArray, blockers: IntArray) -> None:
+        """Let the links `rows` (n,) have `count` (n,) of `blockers` each, in lists one after the other."""
         room = self.blocker_room[rows]
         longer = np.where(count > room, count, 0)
         first = self._pool.extend(int(longer.sum()))
-        start = np.where(
-            count > room, first + np.cumsum(longer, dtype=np.int64) - longer, self.blocker_start[rows]
-        )
-        put_ranges(batch.blockers, start, count, self.pool)
-        for name in _COLUMNS:
-            getattr(self, name)[rows] = getattr(batch, name)
+        own = first + np.cumsum(longer, dtype=np.int64) - longer
+        start = np.where(count > room, own, self.blocker_start[rows])
+        put_ranges(blockers, start, count, self.pool)
         self.blocker_start[rows] = start
+        self.blocker_count[rows] = count
         self.blocker_room[rows] = np.maximum(room, count)
-        self.debt[rows] = 0
 
     def replace(self, gone: IntArray, batches: Sequence[LinkBatch]) -> Iterator[None]:
         """Put links in the place of the rows `gone` (n,), ascending; yields every few milliseconds.
@@ -253,8 +259,11 @@ class LinkTable:
         yield from self._tidy(2.0)
 
     def trim(self) -> Iterator[None]:
-        """Give back what is held beyond the links themselves; yields every few milliseconds."""
-        yield from self._tidy(1.0)
+        """Give back what is held beyond the links themselves, where that is worth it.
+
+        Yields every few milliseconds.
+        """
+        yield from self._tidy(_TRIM)
         for name in (*_OWN, "pool"):
             getattr(self, f"_{name}").trim()
             yield

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import Corners, FloatArray, IntArray, Points
+from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
+from solver.visibility.sampling import hash_index
 
 
 @kernel
@@ -176,3 +177,16 @@ def place_elements(
                 d = centroid[e, axis] - centroid[parent[e], axis]
                 offset[e, 0] += d * u[axis]
                 offset[e, 1] += d * v[axis]
+
+
+@kernel
+def place_keys(centroid: Points) -> Int64Array:
+    """Numbers (n,) that are the same for elements with the same `centroid` (n, 3), bit by bit."""
+    keys = np.empty(len(centroid), dtype=np.int64)
+    bits = centroid.view(np.int64)
+    for e in range(len(centroid)):
+        key = np.int64(0)
+        for axis in range(3):
+            key = hash_index(key + bits[e, axis])
+        keys[e] = key
+    return keys

@@ -14,8 +14,8 @@ import numpy as np
 
 from solver.kernels import kernel
 from solver.parallel import run_chunks
-from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray, IntArray, Points
-from solver.visibility.pair_rays import STRATA, generate_rays
+from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.visibility.pair_rays import STRATA, find_rays_through, generate_rays
 from solver.visibility.rays import RayScene
 
 STRATIFIED: Final = 0.75
@@ -155,12 +155,13 @@ def visible_fractions(
     axes: FloatArray,
     centroid: Points,
     moment: FloatArray,
+    key: Int64Array,
     samples: int = 1,
 ) -> VisibleFractions:
     """Visible fractions of the light paths between element pairs p, q (n,), by 16 `samples` rays each.
 
     corners (m, 4, 3), counts (m,), area (m,), patch (m,), centroid (m, 3) and second moments (m, 3) are the
-    elements', normals (k, 3) and axes (k, 2, 3) the patches'.
+    elements', as is the key (m,) that their rays go by; normals (k, 3) and axes (k, 2, 3) the patches'.
     """
     n = len(p)
     result = VisibleFractions(
@@ -187,8 +188,9 @@ def visible_fractions(
             places: Float32Array = places,
         ) -> None:
             generate_rays(
-                p, q, samples, corners, counts, area, patch, normals, axes, centroid, rays.center, rays.scale,
-                rays.offset, first, first + start, first + stop, origins, directions, weights, strata, places,
+                p, q, samples, corners, counts, area, patch, normals, axes, centroid, key, rays.center,
+                rays.scale, rays.offset, first, first + start, first + stop, origins, directions, weights, strata,
+                places,
             )  # fmt: skip
 
         run_chunks(generate, last - first, _CHUNK, max(1, _LEAST // samples))
@@ -198,3 +200,46 @@ def visible_fractions(
             result.noise, result.lean_p, result.lean_q, result.residual_p, result.residual_q,
         )  # fmt: skip
     return result
+
+
+def rays_through(
+    rays: RayScene,
+    boxes: FloatArray,
+    p: IntArray,
+    q: IntArray,
+    corners: Corners,
+    counts: IntArray,
+    area: FloatArray,
+    patch: IntArray,
+    normals: FloatArray,
+    axes: FloatArray,
+    centroid: Points,
+    key: Int64Array,
+    samples: IntArray,
+) -> BoolArray:
+    """Whether any of the rays of pairs p, q (n,) meets one of `boxes` (k, 2, 3), metres.
+
+    They are those that `visible_fractions` takes, 16 `samples` (n,) of each pair. Others as there.
+    """
+    local = (boxes - rays.center) * rays.scale
+    found = np.empty(len(p), dtype=np.bool_)
+    for number in np.unique(samples):
+        part = np.flatnonzero(samples == number)
+        some_p, some_q, through = p[part], q[part], np.empty(len(part), dtype=np.bool_)
+
+        def work(
+            start: int,
+            stop: int,
+            number: int = int(number),
+            p: IntArray = some_p,
+            q: IntArray = some_q,
+            through: BoolArray = through,
+        ) -> None:
+            find_rays_through(
+                p, q, number, corners, counts, area, patch, normals, axes, centroid, key, rays.center,
+                rays.scale, rays.offset, local, start, stop, through,
+            )  # fmt: skip
+
+        run_chunks(work, len(part), _CHUNK, _LEAST)
+        found[part] = through
+    return found

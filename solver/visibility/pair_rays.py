@@ -1,7 +1,7 @@
 """The rays between two elements: from quadrant to quadrant, each with its weight and its place on either end.
 
 A pair is sampled by 16 s rays: each quadrant of one element towards each quadrant of the other, s times,
-at points of a low-discrepancy sequence shifted by a hash of the pair.
+at points of a low-discrepancy sequence shifted by a hash of the pair's keys.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import ByteArray, Corners, Float32Array, FloatArray, IntArray, Points
+from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.sampling import fraction_of, hash_index, sample_by_solid_angle, sample_element
 
 STRATA: Final = 16
@@ -78,6 +78,7 @@ def generate_rays(
     normals: FloatArray,
     axes: FloatArray,
     centroid: Points,
+    key: Int64Array,
     center: FloatArray,
     scale: float,
     offset: float,
@@ -103,7 +104,7 @@ def generate_rays(
         n1 = normals[patch[i]]
         n2 = normals[patch[j]]
         close = _is_close(corners[i], counts[i], corners[j], counts[j])
-        h = hash_index(np.int64(i) * np.int64(1000003) + np.int64(j))
+        h = hash_index(key[i] * np.int64(1000003) + key[j])
         for axis in range(4):
             shift[axis] = ((h >> (15 * axis)) & 0x7FFF) / 32768.0
         ray = (link - first) * STRATA * samples
@@ -159,3 +160,64 @@ def _place(x: FloatArray, centroid: FloatArray, axes: FloatArray, out: Float32Ar
         for axis in range(3):
             total += (x[axis] - centroid[axis]) * axes[k, axis]
         out[k] = total
+
+
+@kernel
+def find_rays_through(
+    p: IntArray,
+    q: IntArray,
+    samples: int,
+    corners: Corners,
+    counts: IntArray,
+    area: FloatArray,
+    patch: IntArray,
+    normals: FloatArray,
+    axes: FloatArray,
+    centroid: Points,
+    key: Int64Array,
+    center: FloatArray,
+    scale: float,
+    offset: float,
+    boxes: FloatArray,
+    start: int,
+    stop: int,
+    through: BoolArray,
+) -> None:
+    """Whether any ray of links [start, stop) meets any of `boxes` (k, 2, 3), in the frame of the rays."""
+    n = STRATA * samples
+    origins = np.empty((n, 3), dtype=np.float32)
+    directions = np.empty((n, 3), dtype=np.float32)
+    weights = np.empty(n)
+    strata = np.empty(n, dtype=np.uint8)
+    places = np.empty((n, 4), dtype=np.float32)
+    for link in range(start, stop):
+        generate_rays(
+            p, q, samples, corners, counts, area, patch, normals, axes, centroid, key, center, scale, offset,
+            link, link, link + 1, origins, directions, weights, strata, places,
+        )  # fmt: skip
+        through[link] = False
+        for ray in range(n):
+            if weights[ray] > 0.0 and _meets(origins[ray], directions[ray], boxes):
+                through[link] = True
+                break
+
+
+@kernel
+def _meets(origin: Float32Array, direction: Float32Array, boxes: FloatArray) -> bool:
+    """Whether the way from `origin` to `origin + direction` meets a box."""
+    for box in range(len(boxes)):
+        begin = 0.0
+        end = 1.0
+        for axis in range(3):
+            d = float(direction[axis])
+            low = boxes[box, 0, axis] - origin[axis]
+            high = boxes[box, 1, axis] - origin[axis]
+            if d == 0.0:
+                if low > 0.0 or high < 0.0:
+                    end = -1.0
+            else:
+                begin = max(begin, min(low / d, high / d))
+                end = min(end, max(low / d, high / d))
+        if begin <= end:
+            return True
+    return False
