@@ -39,6 +39,8 @@ from service.routes import (
 )
 from service.routes import sessions as session_routes
 from service.session_metrics import SessionMetrics
+from service.slow_clients import BodyPace
+from service.streaming.quota import StreamQuota
 
 
 def create_app(settings: ServiceSettings | None = None, nursery: Nursery | None = None) -> FastAPI:
@@ -62,11 +64,14 @@ def create_app(settings: ServiceSettings | None = None, nursery: Nursery | None 
         middleware=[
             Middleware(RequestLog),
             Middleware(RequestMetrics, metrics=metrics),
+            Middleware(BodyPace, seconds=chosen.body_seconds, rate=chosen.body_rate),
             Middleware(BodyLimit, max_bytes=chosen.max_body_bytes),
         ],
         redoc_url=None,
     )
-    app.state.context = Context(chosen, pool, journal, sessions, metrics, None if nursery else source)
+    streams = StreamQuota(chosen.max_session_streams, chosen.max_streams)
+    own = None if nursery else source
+    app.state.context = Context(chosen, pool, journal, sessions, metrics, streams, own)
     problems.install(app)
     app.include_router(pages.router)
     for routes in (

@@ -77,6 +77,11 @@ class ServiceSettings(BaseSettings):
         ge=0,
         description="Sessions that work on their light at once, in turns; 0: as many as there are cores.",
     )
+    max_session_bytes: int = Field(
+        default=4 * 2**30,
+        ge=2**20,
+        description="Bytes of memory that a session may take; one that takes more is paused, with a warning.",
+    )
     max_kept_sessions: _Count = Field(default=1000, description="Sessions in all, sleeping ones too.")
     max_light_bytes: int = Field(
         default=256 * 2**20,
@@ -89,6 +94,17 @@ class ServiceSettings(BaseSettings):
     )
     max_body_bytes: _Count = Field(default=32 * 2**20, description="Bytes of a request body.")
     max_message_bytes: _Count = Field(default=4 * 2**20, description="Bytes of a message on a stream.")
+    head_seconds: float = Field(
+        default=10.0, gt=0.0, description="Longest that the head of a request may take to come."
+    )
+    body_seconds: float = Field(
+        default=20.0, gt=0.0, description="Longest that a body may take, beside its time at body_rate."
+    )
+    body_rate: float = Field(default=16384.0, gt=0.0, description="Least bytes of a body in a second.")
+    max_session_streams: _Count = Field(
+        default=32, description="Streams of a session at once, WebSockets and events."
+    )
+    max_streams: _Count = Field(default=256, description="Streams in all at once.")
     stream_idle_seconds: float = Field(
         default=120.0, gt=0.0, description="A stream on which nothing has come for this long is closed."
     )
@@ -119,7 +135,7 @@ class ServiceSettings(BaseSettings):
     @property
     def terms(self) -> Terms:
         """What holds for all sessions."""
-        return Terms(self.scene_limits, self.frame_limits, self.wake_seconds)
+        return Terms(self.scene_limits, self.frame_limits, self.max_session_bytes, self.wake_seconds)
 
     @property
     def scene_limits(self) -> SceneLimits:

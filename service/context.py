@@ -17,6 +17,7 @@ from service.hosting.sessions import Session, Sessions
 from service.journal.journal import Journal
 from service.metrics import Metrics
 from service.ownership import owner_of
+from service.streaming.quota import StreamQuota
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class Context:
     journal: Journal
     sessions: Sessions
     metrics: Metrics
+    streams: StreamQuota
     nursery: Nursery | None = None
     """That workers come from, where it is of this app alone"""
 

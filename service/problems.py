@@ -19,6 +19,7 @@ from service.hosting.messages import Refusal, RefusalKind
 from service.hosting.remote import RefusedError, WorkerGoneError
 from service.hosting.sessions import NoSuchSessionError, TooManySessionsError
 from service.journal.store import JournalError
+from service.streaming.quota import TooManyStreamsError
 from solver.errors import LimitExceededError, SceneError
 
 MEDIA_TYPE: Final = "application/problem+json"
@@ -59,6 +60,8 @@ NOTHING: Final = Kind("nothing-to-reverse", 409, "There is no edit batch to go t
 NOT_READY: Final = Kind("not-ready", 409, "What was asked for is not there yet")
 LIMIT: Final = Kind("limit-exceeded", 413, "More than the limit was asked for")
 TOO_MANY_SESSIONS: Final = Kind("too-many-sessions", 429, "There are too many sessions")
+TOO_MANY_STREAMS: Final = Kind("too-many-streams", 429, "There are too many streams")
+TOO_SLOW: Final = Kind("too-slow", 408, "The request came too slowly")
 UNAUTHORIZED: Final = Kind("unauthorized", 401, "A bearer token is needed")
 FORBIDDEN: Final = Kind("forbidden", 403, "This is not allowed")
 UPGRADE: Final = Kind("upgrade-required", 426, "This call takes another protocol")
@@ -98,7 +101,7 @@ _TITLES: Final = {
     413: LIMIT.title,
     415: UNSUPPORTED_MEDIA.title,
     422: INVALID.title,
-    429: TOO_MANY_SESSIONS.title,
+    429: "There are too many sessions, or too many streams",
     501: NOT_AVAILABLE.title,
     503: "The session's worker is gone, or this machine cannot draw frames",
 }
@@ -163,6 +166,8 @@ class ProblemError(HTTPException):
                 return cls(NO_SUCH_SESSION, str(error))
             case TooManySessionsError():
                 return cls(TOO_MANY_SESSIONS, str(error), headers=_later(error))
+            case TooManyStreamsError():
+                return cls(TOO_MANY_STREAMS, str(error), headers=_later(error))
             case WorkerGoneError():
                 return cls(WORKER_GONE, str(error), headers=_later(error))
             case KeyUsedError():
@@ -182,6 +187,7 @@ ToldError: TypeAlias = (
     | LimitExceededError
     | NoSuchSessionError
     | TooManySessionsError
+    | TooManyStreamsError
     | WorkerGoneError
     | KeyUsedError
     | JournalError

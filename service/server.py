@@ -16,6 +16,7 @@ from service.app import create_app
 from service.config import ServiceSettings
 from service.context import Context
 from service.hosting.nursery import Nursery
+from service.slow_clients import patient
 
 _GRACE: Final = 5
 """Seconds that requests are given to end when the server does."""
@@ -35,6 +36,7 @@ class Server(uvicorn.Server):
                 log_level="warning",
                 access_log=False,
                 timeout_graceful_shutdown=_GRACE,
+                http=patient(self._context.settings.head_seconds),
                 ws_max_size=self._context.settings.max_message_bytes,
                 ws_per_message_deflate=False,  # frames are compressed already
             )

@@ -24,6 +24,13 @@ class SessionMetrics:
             buckets=_SECONDS,
             registry=registry,
         )
+        self.frames = Histogram(
+            "halflight_frame_seconds",
+            "From asking for a frame until it is there, encoded; those that wait for light are left out",
+            ["renderer"],
+            buckets=_SECONDS,
+            registry=registry,
+        )
         self.commits = Histogram(
             "halflight_journal_commit_seconds",
             "Time to make a transaction of the journal safe",

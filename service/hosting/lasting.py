@@ -17,7 +17,16 @@ from typing import Final, TypeAlias, TypeVar, cast
 
 from service.hosting.keeping import answer_text, digest_of, read_answer, settings_text, step_of
 from service.hosting.light_keeping import LightPlace
-from service.hosting.messages import ApplyEdits, EditsAnswer, Open, Redo, Request, Undo
+from service.hosting.messages import (
+    ApplyEdits,
+    EditsAnswer,
+    FrameAnswer,
+    GetFrame,
+    Open,
+    Redo,
+    Request,
+    Undo,
+)
 from service.hosting.remote import RemoteWorker, WorkerGoneError
 from service.hosting.reviving import Processes
 from service.journal.documents import Snapshot, Step, read_snapshot, read_step, text_of
@@ -26,8 +35,11 @@ from service.journal.recollection import Recollection
 from service.journal.store import JournalError, Kept, KeyedAnswer, Stands, Whole
 from service.session_metrics import SessionMetrics
 from solver.document.limits import SceneLimits
-from solver.engine.requests import FrameLimits
+from solver.engine.past import Past
+from solver.engine.requests import FrameLimits, WaitFor
 from solver.engine.status import EngineStatus
+from solver.geometry.scene import Scene
+from solver.illumination.settings import LightSettings
 
 R = TypeVar("R")
 
@@ -54,8 +66,14 @@ class Terms:
 
     scene_limits: SceneLimits
     frame_limits: FrameLimits
+    most_bytes: int
+    """Of memory that a session may take"""
     wake_seconds: float
     """That a request waits for its session to be brought back"""
+
+    def opening(self, scene: Scene | Past, settings: LightSettings, light: LightPlace | None = None) -> Open:
+        """What a worker is told of a session."""
+        return Open(scene, settings, self.scene_limits, self.frame_limits, self.most_bytes, light)
 
 
 class LastingWorker:
@@ -123,7 +141,12 @@ class LastingWorker:
         """
         step = step_of(request)
         if step is None:
-            return (await self._processes.put(request))[0]
+            start = time.perf_counter()
+            answer, _ = await self._processes.put(request)
+            if isinstance(request, GetFrame) and request.wait.until is WaitFor.NONE:
+                renderer = cast("FrameAnswer", answer).outlook.renderer
+                self._metrics.frames.labels(renderer).observe(time.perf_counter() - start)
+            return answer
         # Whoever asked may stop to wait, but what the engine has taken must be written.
         return await asyncio.shield(self._processes.later(self._change(request, step)))
 
@@ -223,8 +246,7 @@ class LastingWorker:
 
     def _opening_of(self, whole: Whole) -> Open:
         recollection = _recollection(whole)
-        limits, frame_limits = self._terms.scene_limits, self._terms.frame_limits
-        return Open(recollection.past(), recollection.settings, limits, frame_limits, self._light)
+        return self._terms.opening(recollection.past(), recollection.settings, self._light)
 
 
 def _recollection(whole: Whole) -> Recollection:

@@ -49,6 +49,8 @@ class Open(Request[EngineStatus]):
     settings: LightSettings
     limits: SceneLimits
     frame_limits: FrameLimits
+    most_bytes: int
+    """Of memory that it may take"""
     light: LightPlace | None = None
     """Where its light is kept; None: nowhere"""
 

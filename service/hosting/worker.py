@@ -17,6 +17,7 @@ from typing import Final, NoReturn
 from service.hosting.answers import CHANGING, REFUSED, answer, refusal_of
 from service.hosting.board import Turn
 from service.hosting.light_keeping import LightKeeper
+from service.hosting.memory_limit import MemoryLimit
 from service.hosting.messages import (
     Abandon,
     Answer,
@@ -61,6 +62,7 @@ class Host:
         self._reported: EngineStatus | None = None
         self._report_due = 0.0
         self._keeper = LightKeeper(None)
+        self._memory: MemoryLimit | None = None
 
     def run(self) -> NoReturn:
         """Serve for ever: the reading thread ends the process."""
@@ -129,6 +131,7 @@ class Host:
 
     def _open(self, request: Open) -> EngineStatus:
         self._keeper = LightKeeper(request.light)
+        self._memory = MemoryLimit(request.most_bytes)
         limits, drawing, kept = request.limits, self._drawing, self._keeper.read()
         self._engine = Engine(request.scene, request.settings, limits, drawing, request.frame_limits, kept)
         return self._engine.status()
@@ -152,6 +155,9 @@ class Host:
             self._busy = True  # for all that is known
             return
         self._busy = engine.step(SLICE)
+        if self._memory is not None and self._memory.is_passed():
+            engine.halt(self._memory.reason)
+            self._busy = False
         self._turn.worked(self._busy)
         if self._busy != was_busy or (self._busy and time.monotonic() >= self._report_due):
             self._report()

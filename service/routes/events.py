@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from service.context import UsedSession
+from service.context import Ctx, UsedSession
 from service.hosting.messages import GetStatus
 from service.hosting.sessions import Session
 from service.problems import responses
@@ -17,13 +17,14 @@ from service.schemas import SessionStatus
 router = APIRouter(prefix="/v1", tags=["sessions"])
 
 
-async def living(session: UsedSession) -> Session:
-    """The session that the path names, awake. Raises what waking does."""
-    await session.worker.call(GetStatus())
-    return session
+async def living(session: UsedSession, context: Ctx) -> AsyncIterator[Session]:
+    """The session that the path names, awake. Raises what waking does, and TooManyStreamsError."""
+    with context.streams.taken(session.id):
+        await session.worker.call(GetStatus())
+        yield session
 
 
-@router.get("/sessions/{id}/events", response_class=EventSourceResponse, responses=responses(404, 503))
+@router.get("/sessions/{id}/events", response_class=EventSourceResponse, responses=responses(404, 429, 503))
 async def session_events(session: Annotated[Session, Depends(living)]) -> AsyncIterator[ServerSentEvent]:
     """Every change of status, as events `status` whose data is the status; the first at once.
 

@@ -10,7 +10,7 @@ from service.config import ServiceSettings
 from service.context import Ctx, Owner, UsedSession
 from service.file_body import FileRoute
 from service.file_query import described
-from service.hosting.messages import Configure, GetScene, GetStatus, Open
+from service.hosting.messages import Configure, GetScene, GetStatus
 from service.hosting.sessions import Session
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
@@ -43,8 +43,7 @@ async def open_session(
     """
     limits = context.settings
     scene, settings = await asyncio.to_thread(_start, body, limits)
-    opening = Open(scene, settings, limits.scene_limits, limits.frame_limits)
-    session, status = await context.sessions.open(opening, owner or "")
+    session, status = await context.sessions.open(limits.terms.opening(scene, settings), owner or "")
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
     return SessionStatus.of(session.id, status)

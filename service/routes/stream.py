@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+from contextlib import ExitStack
 from typing import Annotated, Final
 from urllib.parse import urlsplit
 
@@ -36,14 +37,16 @@ async def no_socket() -> None:
 async def session_stream(socket: WebSocket, session_id: Annotated[str, Path(alias="id")]) -> None:
     """Cameras and edits in, frames out as they improve."""
     context: Context = socket.app.state.context
+    taken = ExitStack()
     try:
         session = _admitted(socket, session_id, context)
+        taken.enter_context(context.streams.taken(session.id))
     except TOLD as error:
         told = ProblemError.of_error(error, "header")
         await socket.send_denial_response(respond(told.kind, str(told.detail), told.errors, told.headers))
         return
     offered = socket.scope.get("subprotocols", [])
-    with session.in_use(), context.metrics.stream_clients.track_inprogress():
+    with taken, session.in_use(), context.metrics.stream_clients.track_inprogress():
         await socket.accept(PROTOCOL if PROTOCOL in offered else None)
         await Connection(socket, session, context).serve()
 

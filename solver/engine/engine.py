@@ -168,13 +168,14 @@ class Engine:
         self._catch_up()
         if settings == self._settings:
             return
-        self._halted = None
-        before, self._settings = self._settings, settings
+        # What is too large to be gone on from would be so again.
+        earlier = self._solution if self._halted is None else None
+        before, self._settings, self._halted = self._settings, settings, None
         if settings.solves_as(before):
             self._fine, self._gathers, self._instant = None, None, None
             self._turn += 1
         else:
-            self._settle(World.of(self.scene, self._world, _in_colour(settings)), self._solution, False)
+            self._settle(World.of(self.scene, self._world, _in_colour(settings)), earlier, False)
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; False if nothing needed any.
