@@ -111,5 +111,5 @@ def _scale(field: RadiosityField, patches: int) -> FloatArray:
     bright = field.irradiance @ LUMINANCE_WEIGHTS
     area: FloatArray = np.maximum(np.bincount(field.patch, field.area, patches), 1e-300)
     own = np.sqrt(np.bincount(field.patch, field.area * bright**2, patches) / area)
-    whole = np.sqrt((field.area * bright**2).sum() / field.area.sum())
+    whole = np.sqrt((field.area * bright**2).sum() / max(float(field.area.sum()), 1e-300))
     return np.asarray(np.maximum(np.sqrt(own * whole), 1e-12 * max(float(whole), 1e-300)))
