@@ -102,7 +102,8 @@ def bench(
             targets.extend(table.targets)
             _tell(table.markdown() if markdown else table.rich())
             run = runs.Run.of(machine, options, time.perf_counter() - begun, measured, table)
-            runs.save(kept, {**runs.load(kept), section.name: run})
+            before = runs.load(kept)
+            runs.save(kept, {**before, section.name: run.joined(before.get(section.name))})
             if plots is not None and section.plot is not None:
                 plots.mkdir(parents=True, exist_ok=True)
                 section.plot(measured, plots)

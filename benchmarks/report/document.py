@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from benchmarks.report import profile
 from benchmarks.report.front import GOALS, NEVER, Reached, chosen, reached, reached_by_noise
 from benchmarks.report.peers import DENOISED, RAW
 from benchmarks.report.plots import has_plots, plot_name, plot_scaling, plot_trials
-from benchmarks.report.runs import Run, missing_of, sizes_of, trials_of
+from benchmarks.report.runs import Run, missing_of, profiles_of, sizes_of, trials_of
+from benchmarks.report.sections import tabulate_cold, tabulate_edited, tabulate_peers, tabulate_scaling
 from benchmarks.report.telling import ratio_text, text_of
-from benchmarks.report.trials import Case, Trial
+from benchmarks.report.trials import Case, Trial, Trials
 from benchmarks.tables import Row, Table, Target, percent
 
 REPORTED: Final = ("cold", "edited", "peers", "profile", "scaling")
@@ -144,7 +146,7 @@ def _head(runs: dict[str, Run]) -> str:
 
 
 def _ratios(runs: dict[str, Run], trials: list[Trial]) -> str:
-    missing = missing_of(runs)
+    missing = "" if any(trial.is_peer for trial in trials) else missing_of(runs)
     told = f"Peers: {missing}.\n" if missing else ""
     return "\n".join(["## Beside peers", "", told, headline(runs).markdown(), _renderpark(trials).markdown()])
 
@@ -175,10 +177,20 @@ def _curves(pictures: list[str]) -> str:
 
 def _tables(runs: dict[str, Run]) -> str:
     parts = ["## All settings, scaling, and where the time goes", ""]
-    parts += [runs[name].table for name in REPORTED if name in runs]
+    parts += [_table_of(name, runs).markdown() for name in REPORTED if name in runs]
     if "scaling" in runs:
         parts += ["![time](performance/scaling_time.svg) ![memory](performance/scaling_memory.svg)", ""]
     others = [run.table for name, run in runs.items() if name not in REPORTED]
     if others:
         parts += ["## Other measurements", "", *others]
     return "\n".join(parts)
+
+
+def _table_of(name: str, runs: dict[str, Run]) -> Table:
+    """Of a section of the report, from the figures of all of its runs, scene by scene."""
+    if name == "scaling":
+        return tabulate_scaling(sizes_of(runs))
+    if name == "profile":
+        return profile.tabulate([profile.Profiles(tuple(profiles_of(runs)))])
+    told = Trials(tuple(trials_of({name: runs[name]})), missing_of(runs) if name == "peers" else "")
+    return {"cold": tabulate_cold, "edited": tabulate_edited, "peers": tabulate_peers}[name]([told])

@@ -19,6 +19,9 @@ from solver.engine.requests import RendererName
 LIMIT: Final = 60.0
 """Seconds of one measurement in the full form"""
 
+_SCALING_LIMIT: Final = 30.0
+"""Of each of the two that are measured of one size"""
+
 QUICK_LIMIT: Final = 6.0
 QUICK_SCENES: Final = ("cornell", "office")
 
@@ -73,7 +76,7 @@ def peers(options: Options) -> Section:
 
 def scaling(options: Options) -> Section:
     """Scenes of ever more polygons."""
-    limit = 2.0 * QUICK_LIMIT if options.quick else LIMIT
+    limit = QUICK_LIMIT if options.quick else _SCALING_LIMIT
     jobs = (
         Job(f"{family.name}, {size:,} polygons", measure_size, (family.name, size, limit))
         for family in FAMILIES.values()

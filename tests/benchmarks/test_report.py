@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,14 @@ def test_the_report_is_whole_and_reads_back(cold: Trials, tmp_path: Path) -> Non
         assert (tmp_path / "performance" / plot).stat().st_size > 0
     run = runs.Run.of(machine, options, 1.0, [rival], sections.tabulate_peers([rival]))
     runs.save(file, {**known, "peers": run})
+    again = runs.load(file)["cold"].joined(known["cold"])
+    assert again == known["cold"]
+    office = replace(
+        known["cold"], figures=[{"trials": [{"scene": "office", "renderer": "flat"}]}], commit="b"
+    )
+    joined = office.joined(known["cold"])
+    assert [one["trials"][0]["scene"] for one in joined.figures] == ["cornell", "office"]
+    assert joined.commit.endswith(", b")
     assert "Peers: " not in document.write(tmp_path, runs.load(file)).read_text()
     assert runs.trials_of(runs.load(file)) == [*cold.trials, *rival.trials]
 
