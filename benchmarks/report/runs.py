@@ -1,7 +1,7 @@
 """What has been measured, kept as JSON: each section with the commit, the machine and the day of its run.
 
-A run of some sections leaves those of earlier runs as they were, and a run of some scenes the figures of others,
-so that a long report can be made in pieces.
+A run of some sections leaves those of earlier runs as they were, and a run of some scenes the figures of
+others, so that a long report can be made in pieces.
 """
 
 from __future__ import annotations
