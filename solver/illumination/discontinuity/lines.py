@@ -29,6 +29,9 @@ what the receiver and the scene have."""
 _NO_LIMIT: Final = 256
 """Lines that a leaf may bear where none is left out"""
 
+_SPREAD: Final = 0.2
+"""RMS over a leaf, relative to its weight, of what a line does that is left out: it is wrong near it."""
+
 _AT_ONCE: Final = 64
 """Receivers looked at between two yields."""
 
@@ -103,7 +106,7 @@ def _left_out(
     worst = np.zeros(crossings.leaf_count)
     np.maximum.at(worst, crossings.leaf, np.where(np.isfinite(entries), entries, 0.0))
     light = float(field.area @ (field.irradiance @ LUMINANCE_WEIGHTS) ** 2)
-    return min(1.0, float(np.sqrt(field.area @ worst**2 / light))) if light > 0.0 else 0.0
+    return min(1.0, _SPREAD * float(np.sqrt(field.area @ worst**2 / light))) if light > 0.0 else 0.0
 
 
 def _scale(field: RadiosityField, patches: int) -> FloatArray:
