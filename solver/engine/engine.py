@@ -117,7 +117,7 @@ class Engine:
         self._halted: str | None = None
         """What to tell where no work is done until the next change"""
         self._power: dict[ObjectId, float] = {}
-        """W of luminance that left each object before the last transition"""
+        """W of luminance that left each object before the last transition that goes on with no drag"""
         self._settle(World.of(standing, in_colour=_in_colour(self._settings)), None, False, kept)
 
     @property
@@ -434,8 +434,10 @@ class Engine:
         before = None
         moved, drags = _moved_alone(step), self._drags
         if not self._is_behind:
-            before, self._power = self._progress(), self._solution.power_by_object()
+            before = self._progress()
             drags = moved is not None and moved == self._moved
+            if not drags:
+                self._power = self._solution.power_by_object()
             self._moved = moved
         elif moved != self._moved:
             drags, self._moved = False, None
