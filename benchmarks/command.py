@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from benchmarks.plan import Options, Section
     from benchmarks.tables import Target
 
-REPORT: Final = ("cold", "edited", "peers", "profile", "scaling")
+REPORT: Final = ("cold", "edited", "peers", "profile", "scaling", "calibration", "savings")
 DETAILS: Final = (
     "solve", "accuracy", "rays", "fine", "points", "frames", "interpolants", "patterns", "walks",
     "instant", "lights", "walkthrough", "edits", "drags", "service",
@@ -143,18 +143,23 @@ def _sections(options: Options) -> list[Section]:
         occlusion,
         patterns,
         point_irradiance,
+        savings,
         serving,
         solving,
         walks,
         walkthrough,
     )
+    from benchmarks.calibration import section as calibration
     from benchmarks.report import profile, sections
 
     details = (
         solving, accuracy, occlusion, fine, point_irradiance, frames, interpolant_frames, patterns, walks,
         instant, instant_costs, walkthrough, edits, drags, serving,
     )  # fmt: skip
-    report = (sections.cold, sections.edited, sections.peers, profile.section, sections.scaling)
+    report = (
+        sections.cold, sections.edited, sections.peers, profile.section, sections.scaling,
+        calibration.section, savings.section,
+    )  # fmt: skip
     return [make(options) for make in (*report, *(module.section for module in details))]
 
 

@@ -24,7 +24,7 @@ _MOST: Final = 5.0
 """Target: told over true, in the median"""
 
 _LEAST_SHOWN: Final = 1e-3
-_PLOT: Final = "calibration.svg"
+PLOT: Final = "calibration.svg"
 
 
 def section(options: Options) -> Section:
@@ -54,8 +54,8 @@ def tabulate(found: list[SceneCases]) -> Table:
         tuple(rows),
         "On rooms drawn at random and on samples, at several tolerances, on the way there, at rest, and "
         "after an edit. True: against the path tracer, elements for the status, pixels of 64x48 for frames, "
-        "single points for probes. Holds: true, less one standard error of its own, is no more than told. Estimates "
-        "of 100 %, when nothing is known yet, are left out.",
+        "single points for probes. Holds: true, less one standard error of its own, is no more than told. "
+        "Estimates of 100 %, when nothing is known yet, are left out.",
         names=1,
     )  # fmt: skip
 
@@ -81,7 +81,15 @@ def plot(found: list[Any], directory: Path) -> None:
         cell.legend(fontsize="small")
     cells[0].set_ylabel("told")
     figure.suptitle("Error estimates: at the line what is told is true, at the dots five times that")
-    figure.savefig(directory / _PLOT)
+    figure.savefig(directory / PLOT)
+
+
+def from_records(records: list[dict[str, Any]]) -> list[SceneCases]:
+    """What `asdict` made of figures, after JSON."""
+    return [
+        SceneCases(tuple(Case(**{**case, "told_by": Told(case["told_by"])}) for case in record["cases"]))
+        for record in records
+    ]
 
 
 def _told(found: list[SceneCases]) -> list[Case]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from benchmarks.calibration import section as calibration
 from benchmarks.report import profile
 from benchmarks.report.front import GOALS, NEVER, Reached, chosen, reached, reached_by_noise
 from benchmarks.report.peers import DENOISED, RAW
@@ -68,6 +69,8 @@ def write(directory: Path, runs: dict[str, Run]) -> Path:
             pictures.append(plot_name(scene, case))
     if sizes_of(runs) and has_plots():
         plot_scaling(sizes_of(runs), plots)
+    if "calibration" in runs and has_plots():
+        calibration.plot(calibration.from_records(runs["calibration"].figures), plots)
     text = "\n".join([_head(runs), _ratios(runs, trials), _times(trials), _curves(pictures), _tables(runs)])
     file = directory / "performance.md"
     file.write_text(text.rstrip() + "\n", encoding="utf-8")
@@ -180,7 +183,13 @@ def _tables(runs: dict[str, Run]) -> str:
     parts += [_table_of(name, runs).markdown() for name in REPORTED if name in runs]
     if "scaling" in runs:
         parts += ["![time](performance/scaling_time.svg) ![memory](performance/scaling_memory.svg)", ""]
-    others = [run.table for name, run in runs.items() if name not in REPORTED]
+    if "calibration" in runs:
+        parts += ["## Whether error estimates hold", "", runs["calibration"].table]
+        parts += [f"![told against true](performance/{calibration.PLOT})", ""]
+    if "savings" in runs:
+        parts += ["## What is spared", "", runs["savings"].table]
+    told = (*REPORTED, "calibration", "savings")
+    others = [run.table for name, run in runs.items() if name not in told]
     if others:
         parts += ["## Other measurements", "", *others]
     return "\n".join(parts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +32,7 @@ def test_all_that_tell_errors_are_asked(cases: SceneCases, tmp_path: Path) -> No
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
     section.plot([cases], tmp_path)
     assert (tmp_path / "calibration.svg").stat().st_size > 1000
+    assert section.from_records(json.loads(json.dumps([asdict(cases)]))) == [cases]
 
 
 def test_a_case_holds_if_no_more_is_true_than_told() -> None:
