@@ -11,7 +11,7 @@ import pytest
 from solver.document.samples import load_sample
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
-from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName
+from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName, Wait, WaitFor
 from solver.engine.world import World
 from solver.pathtracing import PathTracer
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
@@ -78,6 +78,25 @@ def test_frames_are_within_one_percent(name: str, camera: str, drawing: Drawing)
     assert fine.p99 < 0.05
     assert fine.error < 0.5 * coarse.error
     assert fine.error < engine.outlook(request).error_estimate
+
+
+@pytest.mark.parametrize("renderer", [None, RendererName.AUTO])
+@pytest.mark.parametrize("asked", [0.1, 0.05, 0.02])
+@pytest.mark.parametrize(
+    ("name", "camera"),
+    [("cornell", "main"), pytest.param("cube_room", "main", marks=pytest.mark.slow),
+     pytest.param("office", "birds_eye", marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_the_first_frame_within_an_error_is(
+    name: str, camera: str, asked: float, renderer: RendererName | None, drawing: Drawing
+) -> None:
+    """What `wait=max_error` answers with is within that error of the reference."""
+    request = replace(request_of(name, camera), renderer=renderer)
+    engine, wait = Engine(load_sample(name), drawing=drawing), Wait(WaitFor.MAX_ERROR, asked)
+    while not engine.outlook(request).is_worth(wait):
+        engine.step(0.02)
+    assert engine.outlook(request).error_estimate <= asked
+    assert differences(name, camera, luminance(engine, request)).error <= asked
 
 
 def test_the_edge_of_a_shadow_is_crisp_at_twenty_times_zoom(drawing: Drawing) -> None:
