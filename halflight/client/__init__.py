@@ -10,13 +10,17 @@ service has taken, it does not take twice.
 
 from halflight.client.answers import Edited, Frame, LogEntry, Picked, Probed, Status
 from halflight.client.asynchronous import AsyncClient, AsyncSession
+from halflight.client.asynchronous_streams import AsyncStream
+from halflight.client.conversation import StreamFrame, StreamLostError
 from halflight.client.edits import add, move, remove, set_material, set_mesh
 from halflight.client.errors import ProblemError
+from halflight.client.streams import Stream
 from halflight.client.synchronous import Client, Session
 
 __all__ = [
     "AsyncClient",
     "AsyncSession",
+    "AsyncStream",
     "Client",
     "Edited",
     "Frame",
@@ -26,6 +30,9 @@ __all__ = [
     "ProblemError",
     "Session",
     "Status",
+    "Stream",
+    "StreamFrame",
+    "StreamLostError",
     "add",
     "move",
     "remove",

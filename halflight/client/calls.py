@@ -33,8 +33,6 @@ class Call(Generic[T]):
     json: Any = None
     query: Mapping[str, Any] = field(default_factory=dict)
     headers: Mapping[str, str] = field(default_factory=dict)
-    repeatable: bool = True
-    """Whether it does no harm to send it again"""
 
     def answered(self, answer: httpx.Response) -> T:
         """What the answer tells. Raises ProblemError."""
@@ -45,7 +43,7 @@ class Call(Generic[T]):
     def pause(self, answer: httpx.Response | None) -> float | None:
         """Seconds after which it may be sent again, after that answer or none; None where it may not."""
         if answer is None:
-            return _PAUSE if self.repeatable else None
+            return _PAUSE  # which does no harm: what changes something has a key
         # What is refused so was not begun.
         wait = answer.headers.get("retry-after", "")
         return float(wait) if answer.status_code in _AGAIN and wait.isdigit() else None
@@ -61,7 +59,7 @@ def _json(read: Callable[[Any], T]) -> Callable[[httpx.Response], T]:
 
 def open_session(body: Mapping[str, Any]) -> Call[Status]:
     """Open a session."""
-    return Call("POST", "/v1/sessions", _json(Status.of), body, repeatable=False)
+    return Call("POST", "/v1/sessions", _json(Status.of), body, headers=_key())
 
 
 def sessions() -> Call[list[Status]]:

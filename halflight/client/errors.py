@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import httpx
@@ -28,9 +29,14 @@ class ProblemError(Exception):
             told = {}
         if not isinstance(told, dict):
             told = {}
+        return cls.told({"detail": answer.reason_phrase, **told, "status": answer.status_code})
+
+    @classmethod
+    def told(cls, problem: Mapping[str, Any]) -> ProblemError:
+        """From JSON."""
         return cls(
-            answer.status_code,
-            str(told.get("type", "about:blank")),
-            str(told.get("detail", answer.reason_phrase)),
-            list(told.get("errors", [])),
+            int(problem["status"]),
+            str(problem.get("type", "about:blank")),
+            str(problem.get("detail", "")),
+            list(problem.get("errors") or []),
         )

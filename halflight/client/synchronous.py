@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 from halflight.client import calls
 from halflight.client.answers import Edited, Frame, LogEntry, Picked, Probed, Status
 from halflight.client.calls import Call
+from halflight.client.conversation import address_of
 from halflight.client.edits import Edit
 from halflight.client.errors import ProblemError
+from halflight.client.streams import Stream
 
 T = TypeVar("T")
 
@@ -35,6 +37,7 @@ class Client:
         """`timeout`: seconds until an answer must have begun. `patience`: seconds for which what is refused
         for now, or has met no answer, is sent again."""
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        self._address, self._headers, self._timeout = address, headers, timeout
         self._http = httpx.Client(base_url=address, headers=headers, timeout=timeout)
         self._patience = patience
 
@@ -69,6 +72,10 @@ class Client:
     def sessions(self) -> list[Status]:
         """How all sessions stand."""
         return self.do(calls.sessions())
+
+    def stream(self, path: str) -> Stream:
+        """The stream of the session of that path."""
+        return Stream(address_of(self._address, path), self._headers, self._timeout)
 
     def do(self, call: Call[T]) -> T:
         """Make a call, and again where that helps."""
@@ -146,6 +153,10 @@ class Session:
     def frame(self, camera: str | None = None, **query: Any) -> Frame:
         """A frame; the query is the interface's: `format`, `wait`, `width`, `eye=[1, 2, 3]`, and so on."""
         return self._client.do(calls.frame(self._path, {"camera": camera, **query}))
+
+    def stream(self) -> Stream:
+        """Frames as they become better, and edits in between, over a connection that is kept."""
+        return self._client.stream(self._path)
 
     def pick(self, x: int, y: int, camera: str | None = None, **query: Any) -> Picked:
         """What a pixel shows, in column `x` and row `y`, from 0 at the top left."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import secrets
 import time
@@ -13,7 +14,7 @@ from typing import Final
 
 from service.hosting.keeping import settings_text
 from service.hosting.lasting import LastingWorker, Terms
-from service.hosting.messages import Open
+from service.hosting.messages import GetStatus, Open
 from service.hosting.pool import WorkerPool
 from service.hosting.remote import RefusedError, RemoteWorker
 from service.journal.documents import Snapshot, text_of
@@ -142,6 +143,8 @@ class Sessions:
         self._by_id: dict[str, Session] = {}
         self._opening = 0
         self._making_room = asyncio.Lock()
+        self._names: dict[str, asyncio.Lock] = {}
+        """Of sessions that are being opened by a key"""
 
     def __len__(self) -> int:
         return len(self._by_id)
@@ -165,28 +168,46 @@ class Sessions:
             raise NoSuchSessionError(session_id)
         return found
 
-    async def open(self, request: Open, owner: str = "") -> tuple[Session, EngineStatus]:
-        """A new session, solving and written, and how it stands.
+    async def open(
+        self, request: Open, owner: str = "", key: str | None = None
+    ) -> tuple[Session, EngineStatus]:
+        """A new session, solving and written, and how it stands; by a `key`, the same for the same request.
 
         Raises TooManySessionsError, RefusedError, WorkerGoneError, JournalError.
         """
+        snapshot = await asyncio.to_thread(_snapshot_text, request)
+        if key is None:
+            return await self._open_counted(request, snapshot, secrets.token_hex(8), owner)
+        # The name follows from the request, so that it is known after a restart too.
+        told = b"\0".join((owner.encode(), key.encode(), snapshot))
+        name = hashlib.blake2b(told, digest_size=8).hexdigest()
+        async with self._names.setdefault(name, asyncio.Lock()):
+            try:
+                found = self._by_id.get(name)
+                if found is None:
+                    return await self._open_counted(request, snapshot, name, owner)
+                return found, await found.worker.call(GetStatus())
+            finally:
+                self._names.pop(name, None)
+
+    async def _open_counted(
+        self, request: Open, snapshot: bytes, name: str, owner: str
+    ) -> tuple[Session, EngineStatus]:
         if len(self._by_id) + self._opening >= self._quotas.kept:
             raise TooManySessionsError(self._quotas.kept, "kept")
         self._opening += 1
         try:
-            return await self._open(request, owner)
+            return await self._open(request, snapshot, name, owner)
         finally:
             self._opening -= 1
 
-    async def _open(self, request: Open, owner: str) -> tuple[Session, EngineStatus]:
+    async def _open(
+        self, request: Open, snapshot: bytes, name: str, owner: str
+    ) -> tuple[Session, EngineStatus]:
         await self._make_room()
         process = await self._pool.take()
-        name = secrets.token_hex(8)
         try:
-            snapshot, status = await asyncio.gather(
-                asyncio.to_thread(_snapshot_text, request),
-                process.call(replace(request, light=self._lights.place(name))),
-            )
+            status = await process.call(replace(request, light=self._lights.place(name)))
             settings = settings_text(status.settings)
             kept = Kept(name, owner, status.name, status.revision, settings, time.time())
             await self._journal.run(lambda store: store.begin(kept, snapshot))

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
-
-from fastapi import APIRouter, Header
+from fastapi import APIRouter
 
 from service.context import Ctx, UsedSession
 from service.hosting import messages
 from service.hosting.lasting import Edits
 from service.hosting.messages import ApplyEdits, GetLog, Redo, Undo
 from service.hosting.sessions import Session
+from service.idempotency import Key
 from service.json_body import JsonRoute
 from service.problems import responses
 from service.schemas import EditBatch, EditsAnswer, LogAnswer, LogEntry
 from solver.errors import LimitExceededError
 
 router = APIRouter(prefix="/v1", tags=["edits"], route_class=JsonRoute)
-
-
-Key: TypeAlias = Annotated[
-    str | None,
-    Header(
-        min_length=1,
-        max_length=255,
-        description="The client's own name of the request: where it comes again, it gets the same answer and "
-        "changes nothing more. 422 where another request had it. The thousand newest of a session are known.",
-    ),
-]
 
 
 @router.post("/sessions/{id}/edits", responses=responses(404, 409, 413, 422, 503))

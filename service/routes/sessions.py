@@ -12,6 +12,7 @@ from service.file_body import FileRoute
 from service.file_query import described
 from service.hosting.messages import Configure, GetScene, GetStatus
 from service.hosting.sessions import Session
+from service.idempotency import Key
 from service.json_body import JsonRoute
 from service.problems import INVALID, ProblemError, responses
 from service.schemas import SceneAnswer, SessionList, SessionRequest, SessionStatus
@@ -34,16 +35,25 @@ _opening = APIRouter(route_class=FileRoute)
     "/sessions", status_code=201, openapi_extra=described(), responses=responses(413, 422, 429, 503)
 )
 async def open_session(
-    body: SessionRequest, request: Request, response: Response, context: Ctx, owner: Owner
+    body: SessionRequest,
+    request: Request,
+    response: Response,
+    context: Ctx,
+    owner: Owner,
+    idempotency_key: Key = None,
 ) -> SessionStatus:
     """Open a session on a scene. The solve starts at once.
+
+    One that is sent again with its `Idempotency-Key` is answered with the session that it has opened.
 
     The scene may come as JSON, or as a file of another format, with its content type; what its reader could
     not keep is among the session's warnings.
     """
     limits = context.settings
     scene, settings = await asyncio.to_thread(_start, body, limits)
-    session, status = await context.sessions.open(limits.terms.opening(scene, settings), owner or "")
+    session, status = await context.sessions.open(
+        limits.terms.opening(scene, settings), owner or "", idempotency_key
+    )
     context.metrics.sessions_opened.inc()
     response.headers["Location"] = request.url_for("session_status", id=session.id).path
     return SessionStatus.of(session.id, status)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import re
@@ -12,17 +13,17 @@ import httpx
 import numpy as np
 import pytest
 
-from halflight.client import Client, ProblemError, move, set_material
+from halflight.client import AsyncClient, AsyncSession, Client, ProblemError, move, remove, set_material
 from tests.engine.scenes import box_document
-from tests.service.test_server import running
+from tests.service.apps import serving
 
 TOUR = Path(__file__).resolve().parent.parent.parent / "docs" / "client.md"
 
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    with running(HALFLIGHT_TOKENS="ann,ben", HALFLIGHT_WAKE_SECONDS="60") as service:
-        yield str(service.http.base_url)
+    with serving(tokens="ann,ben", wake_seconds=60.0) as http:
+        yield str(http.base_url)
 
 
 @pytest.mark.slow
@@ -30,17 +31,17 @@ def test_the_tour_of_the_documentation_works(tmp_path: Path, monkeypatch: pytest
     snippets = re.findall(r"```python\n(.*?)```", TOUR.read_text(), re.DOTALL)
     assert len(snippets) > 5
     said = io.StringIO()
-    with running() as service, contextlib.redirect_stdout(said):
+    with serving(pool_size=1) as http, contextlib.redirect_stdout(said):
         monkeypatch.chdir(tmp_path)
-        tour = "\n".join(snippets).replace("http://127.0.0.1:8000", str(service.http.base_url))
+        tour = "\n".join(snippets).replace("http://127.0.0.1:8000", str(http.base_url))
         exec(compile(tour, str(TOUR), "exec"), {"__name__": "tour"})
-        assert service.http.get("/v1/sessions").json() == {"sessions": []}
-    lines = said.getvalue().splitlines()
+        assert http.get("/v1/sessions").json() == {"sessions": []}
+    lines = [line for line in said.getvalue().splitlines() if not line.startswith("halflight is ready")]
     assert lines[0] in {"solving", "converged"}
     assert lines[1].startswith("converged")
     assert lines[2].startswith("(160, 160, 3)")
     assert "tall_block" in lines[3]
-    assert "lux" in lines[4]
+    assert "lux" in lines[5]
     assert lines[-1] == "422 ['body', 'edits', 0, 'id']"
     assert (tmp_path / "cornell.png").exists()
 
@@ -93,6 +94,71 @@ def test_a_change_is_made_once_though_answers_are_lost(address: str) -> None:
         assert unhurried.settings["error_tolerance"] == 0.2
         session.wait()
         assert np.isfinite(session.probe([0, 0, 1], [0, 0, 1]).illuminance).all()
+
+
+def test_a_session_is_opened_once_though_the_answer_is_lost(address: str) -> None:
+    with Client(address, token="ann") as client, Client(address, token="ann") as unlucky:
+        unlucky._http._transport.close()
+        unlucky._http._transport = Lossy()
+        session = unlucky.open(box_document(), settings={"error_tolerance": 0.5})
+        assert [status.id for status in client.sessions()] == [session.id]
+        with client.open(box_document(), settings={"error_tolerance": 0.5}) as another:
+            assert another.id != session.id
+        client.session(session.id).close()
+
+
+def test_a_stream_shows_what_is_edited_until_the_session_ends(address: str) -> None:
+    with Client(address, token="ann") as client:
+        session = client.open(box_document())
+        with session.stream() as stream:
+            stream.look(width=32, height=24, format="png", renderer="flat")
+            frame = next(stream)
+            assert frame.image.size == (frame.width, frame.height)
+            assert frame.revision == 1
+            assert stream.edit(move("crate", translation=[0.1, 0, 0]), if_revision=1).revision == 2
+            with pytest.raises(ProblemError) as refused:
+                stream.edit(remove("nobody"))
+            assert refused.value.errors[0]["loc"] == ["message", "edits", 0, "id"]
+            assert stream.undo().revision == 3
+            assert stream.redo().revision == 4
+            for frame in stream:
+                if frame.revision == 4 and frame.converged and frame.quality == "rest":
+                    break
+            assert frame.array.shape == (24, 32, 3)
+            assert stream.status is not None and stream.status.revision == 4
+            stream.look("no such camera")
+            with pytest.raises(ProblemError, match="no such camera"):
+                next(stream)
+            stream.look(width=16, height=12)
+            assert next(stream).width <= 16
+            session.close()
+            assert all(frame.revision == 4 for frame in stream), "and there it ends"
+        with pytest.raises(ProblemError) as gone, session.stream():
+            pass
+        assert gone.value.status == 404
+
+
+def test_a_stream_of_asyncio(address: str) -> None:
+    async def watch(session: AsyncSession) -> list[int]:
+        seen = []
+        async with session.stream() as stream:
+            await stream.look(width=16, height=12, renderer="flat")
+            async for frame in stream:
+                seen.append(frame.revision)
+                if frame.revision == 1:
+                    assert (await stream.edit(move("crate", translation=[0.1, 0, 0]))).revision == 2
+                elif frame.converged:
+                    break
+            assert (await stream.undo()).revision == 3
+        return seen
+
+    async def visit() -> list[int]:
+        async with AsyncClient(address, token="ann") as client, await client.open(box_document()) as session:
+            return await watch(session)
+
+    seen = asyncio.run(visit())
+    assert seen == sorted(seen)
+    assert seen[-1] == 2
 
 
 def test_a_conflict_is_told_at_once(address: str) -> None:
