@@ -136,12 +136,15 @@ class SeenErrors:
         return found
 
     def _light(self, seen: SeenPoints, solver: RadiositySolver, moment: object) -> SeenLight:
-        if self._within is None or self._within[0] != moment:
-            self._within = moment, *_within(solver)
+        tree = solver.state.tree
+        # Elements come and go between two estimates, while views that are new ask.
+        whole = moment, tree, len(tree)
+        if self._within is None or self._within[0] != whole:
+            self._within = whole, *_within(solver)
         _, within, square, mean_square = self._within
         if len(seen.patch) == 0:
             return SeenLight()
-        leaves = leaves_at(solver.state.tree, seen.positions, seen.patch)
+        leaves = leaves_at(tree, seen.positions, seen.patch)
         light = float(square[leaves].mean())
         if light <= 0.0:
             return SeenLight()
