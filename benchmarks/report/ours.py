@@ -28,7 +28,7 @@ from solver.illumination.settings import LightSettings
 
 R = TypeVar("R")
 
-TOLERANCES: Final = (0.16, 0.08, 0.04, 0.02, 0.01, 0.005)
+TOLERANCES: Final = (0.16, 0.08, 0.04, 0.03, 0.02, 0.01)
 """Settings of what is solved, coarse ones first"""
 
 _BY_SAMPLES: Final = (RendererName.VPL, RendererName.PATH)

@@ -22,7 +22,10 @@ STAGES: Final = ("opened", "solved", "corrected", "discontinuities", "triangulat
 """What has been done at each milestone: [H]'s order"""
 
 _SCENES: Final = ("cornell", "office")
-_STEP: Final = 0.002
+_STEP: Final = 0.01
+_SHARE: Final = 0.03
+"""Seconds between two looks, or the share of what has passed if that is more"""
+
 _REQUEST: Final = FrameRequest(CAMERA, RendererName.INTERPOLANT)
 
 
@@ -72,7 +75,7 @@ def _stages(engine: Engine, clock: Clock) -> tuple[float, ...]:
         at += [clock.seconds] * (_reached(engine) - len(at))
         if not outlook.improving:
             break
-        clock.of(lambda: engine.step(_STEP))
+        clock.of(lambda: engine.step(max(_STEP, _SHARE * clock.seconds)))
     at += [clock.seconds] * (len(STAGES) - 1 - len(at))
     start = time.perf_counter()
     engine.frame(_REQUEST)
