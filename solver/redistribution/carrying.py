@@ -164,6 +164,17 @@ def moments_of(state: TransportState) -> FloatArray:
     return moments
 
 
+def moments_of_more(state: TransportState, known: FloatArray) -> FloatArray:
+    """The same, where those of the first elements are `known` (m, 3, channels), and the rest are leaves."""
+    tree, first = state.tree, len(known)
+    count = len(tree) - first
+    fresh = state.radiosity[first:] * state.closure[first:, None, None]
+    moments = np.empty_like(fresh)
+    leaves, none = np.full(count, -1, dtype=np.int32), np.zeros(count, dtype=np.int32)
+    pull(leaves, none, tree.area[first:], tree.moment[first:], tree.offset[first:], fresh, moments)
+    return np.concatenate([known, moments])
+
+
 def _repaint(before: TransportState, after: TransportState, match: Match) -> None:
     """Let patches of another material than before shine by it, in the light that they have."""
     stays = np.flatnonzero(match.number >= 0)

@@ -20,13 +20,14 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
-from solver.redistribution.carrying import carry, moments_of
+from solver.redistribution.carrying import carry, moments_of, moments_of_more, sent_over
 from solver.redistribution.debts import UnlinkedPairs, owe
 from solver.redistribution.energy import doubt_of, rank_links, unshot_square
+from solver.redistribution.marks import Marks
 from solver.redistribution.matching import Match, match_patches
 from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
-from solver.transport.coarsen import coarsen, unneeded
+from solver.transport.coarsen import coarsen, moved_rows, unneeded
 from solver.transport.estimate import SAFETY, Residuals, estimate_error
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
@@ -49,11 +50,15 @@ _ROUGHLY: Final = 0.1
 """Share of what redistribution has left unshot that may be unshot when refinement begins."""
 
 _FIRST_NOISE: Final = 64.0
-"""Noise that links of new pairs may have at first, of the error that is refined: the strongest ones first get
-some light, and more rays when they are refined."""
+"""Noise that links may have at first, of the error that is refined: the strongest ones get some light at
+once, and more rays when they are refined."""
 
 _CLOSER: Final = 0.5
 """Error that what is new may have, of what links had that were there: it is what everybody looks at."""
+
+_EARLY: Final = ((0.3, 32.0), (0.05, 8.0))
+"""Shares of the energy at stake at which links are refined, while others are still to be looked at; and the
+error from which on they are, of what is refined when nothing changes"""
 
 _THRESHOLD: Final = 0.05
 """Share of the energy below which redistribution does not come first any more."""
@@ -96,10 +101,6 @@ class _Plan:
     """RMS of the radiosity that is at stake, relative to what is reflected"""
     light: Light
 
-    def share_left(self, done: int) -> float:
-        """Part of the energy that is still at stake."""
-        return float(self.left[done] / self.left[0]) if self.left[0] > 0.0 else 0.0
-
 
 class Redistribution(RadiositySolver):
     """The solution of a scene, from that of an earlier revision, which is used up."""
@@ -131,7 +132,10 @@ class Redistribution(RadiositySolver):
         self._moments = carried.moments
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
-        self.bound, self.pace = earlier.bound, earlier.pace
+        self.bound = earlier.bound
+        if is_own:
+            # Of a solution that had settled it is that of other work.
+            self.pace = earlier.pace
         self.linked = surfaces.patch_count
         self.lean: int = earlier.lean if isinstance(earlier, Redistribution) else len(earlier.state.links)
         """Links when all of them were last looked at for mergers"""
@@ -154,6 +158,8 @@ class Redistribution(RadiositySolver):
         self._boxes += margin * np.array([[-1.0], [1.0]])
         self.trace: Trace = Trace.after(before, match, carried)
         """What has happened since the last solution that somebody looked at closely"""
+        self._guesses = self._fresh
+        """Elements of fresh patches"""
         self._guess = self._state.received[self._fresh, 0].copy()
         self._guessed = 1.0
         """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
@@ -163,7 +169,7 @@ class Redistribution(RadiositySolver):
         """Whether something has arrived that elements have not received yet"""
         self._plan: _Plan | None = None
         self._paid = 0
-        self._new = self._faded = np.empty(0, dtype=np.int32)
+        self._new, self._faded = Marks(), Marks()
         """Links that are new or have changed, and those of them that something has ceased to block"""
         self.looks = 0
         """Links and pairs looked at anew"""
@@ -216,43 +222,22 @@ class Redistribution(RadiositySolver):
     def _open(self) -> Iterator[bool]:
         plan = self._plan or self._make_plan()
         state = self._state
-        moments = self._known_moments()
-        self._arrived = np.zeros_like(state.received)
-        coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         # What has been shot is as uncertain as what has not, until it is propagated.
         self.error_estimate = min(1.0, math.hypot(self._known_error, SAFETY * plan.doubt))
-        changed, faded = [], []
-        since = 0
-        old = len(state.links)
         yield True
-        for part in self.pace.batches(np.ones(len(plan.energy), dtype=np.int64)):
-            is_link = plan.rows[part] >= 0
-            seen, doubt = plan.rows[part][is_link], plan.doubt_of_each[part][is_link]
-            left = seen[state.links.debt[seen] > 0]
-            changed.append(self._look_again(seen, doubt, plan.light, moments))
-            faded.append(np.intersect1d(changed[-1], left, assume_unique=True))
-            paired = int((plan.rows[part] < 0).sum())
-            self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], coarse, moments)
-            self._unlinked = self._unlinked.without(paired)
-            self._paid = part.stop
-            self.looks += part.stop - part.start
-            self.version += 1
-            self._guessed_now = self.unshot_fraction = share = plan.share_left(part.stop)
-            self.progress = _PROGRESS * (1.0 - share)
-            yield True
-            since += part.stop - part.start
-            if self._is_propagations_turn(share, since):
-                since = 0
-                self._take_in()
-                few = len(plan.energy) - part.stop < _SHOTS_A_GATHER * len(state.links)
-                if not few and self.unshot_power() > float(plan.left[part.stop]):
-                    moments = yield from self._propagate()
-        self._take_in()
-        self._arrived = self._moments = None
+        at_stake = float(plan.left[0])
+        for left, error in _EARLY:
+            yield from self._pay(at_stake, left)
+            if self.bound > 0.0 and not self._is_almost_done():
+                # What is refined now is worth more than what is still to be looked at.
+                yield from self._refine_new(error * self.bound)
+                self._make_plan()
+        yield from self._pay(at_stake, 0.0)
         unshot, scale = unshot_square(state)
         new = math.sqrt(unshot / scale) if scale > 0.0 else 1.0
         self.error_estimate = min(1.0, math.hypot(self._known_error, new))
-        if new > self.settings.error_tolerance and plan.left[0] > 0.0:
+        self._moments = None
+        if new > self.settings.error_tolerance and at_stake > 0.0:
             # So much has changed that refinement would look at the wrong light.
             self._find_closed()
             yield from self._settle(_ROUGHLY * new)
@@ -260,9 +245,51 @@ class Redistribution(RadiositySolver):
             yield True
         else:
             state.radiosity = state.answering()
-        self._faded = np.concatenate([self._faded, *faded])
-        self._new = np.sort(np.concatenate([*changed, np.arange(old, len(state.links), dtype=np.int32)]))
         yield from self._refine_as_before()
+
+    def _pay(self, at_stake: float, least: float) -> Iterator[bool]:
+        """Pay debts by the plan until no more than `least` of the W that were `at_stake` are left."""
+        plan, state = self._plan, self._state
+        assert plan is not None
+        moments = self._known_moments()
+        self._arrived = np.zeros_like(state.received)
+        coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
+        since, before = 0, self._paid
+        for batch in self.pace.batches(np.ones(len(plan.energy) - before, dtype=np.int64)):
+            part = slice(before + batch.start, before + batch.stop)
+            is_link = plan.rows[part] >= 0
+            seen, doubt = plan.rows[part][is_link], plan.doubt_of_each[part][is_link]
+            left = seen[state.links.debt[seen] > 0]
+            changed = self._look_again(seen, doubt, coarse, moments)
+            self._new.mark(changed)
+            self._faded.mark(np.intersect1d(changed, left, assume_unique=True))
+            paired = int((plan.rows[part] < 0).sum())
+            first = len(state.links)
+            self._link(self._unlinked.p[:paired], self._unlinked.q[:paired], coarse, moments)
+            self._new.mark(np.arange(first, len(state.links), dtype=np.int32))
+            self._unlinked = self._unlinked.without(paired)
+            self._paid = part.stop
+            self.looks += part.stop - part.start
+            self.version += 1
+            share = float(plan.left[part.stop]) / at_stake if at_stake > 0.0 else 0.0
+            self._guessed_now = self.unshot_fraction = share
+            self.progress = _PROGRESS * (1.0 - share)
+            yield True
+            if 0.0 < share <= least:
+                break
+            since += part.stop - part.start
+            if self._is_propagations_turn(share, since):
+                since = 0
+                self._take_in()
+                if not self._is_almost_done() and self.unshot_power() > float(plan.left[part.stop]):
+                    moments = yield from self._propagate()
+        self._take_in()
+        self._arrived = None
+
+    def _is_almost_done(self) -> bool:
+        """Whether what is left to be looked at takes less than a gather does."""
+        assert self._plan is not None
+        return len(self._plan.energy) - self._paid < _SHOTS_A_GATHER * len(self._state.links)
 
     def _is_propagations_turn(self, share: float, since: int) -> bool:
         """Whether propagation may come now, `since` shots after the last; `share` of the energy is at stake.
@@ -292,28 +319,24 @@ class Redistribution(RadiositySolver):
     def _refine_as_before(self) -> Iterator[bool]:
         """Refine what is new until it errs no more than what was there, in the light that has arrived."""
         state = self._state
-        if self.bound <= 0.0 or len(self._new) == 0:
+        rows, merging = self._new.rows(), self._faded.rows()
+        if self.bound <= 0.0 or len(rows) == 0:
             return
-        residuals = Residuals.of(state)
-        yield True
         full = len(state.links) > _CREEP * self.lean
-        rows, merging = self._new, self._faded
         if len(state.links) <= _GROWN * self.lean:
             merging = merging[:0]
         if full:
             rows = merging = np.arange(len(state.links), dtype=np.int32)
-        rows = yield from steps(coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound))
+        if len(merging):
+            residuals = Residuals.of(state)
+            yield True
+            work = coarsen(state, self._linker, self.pace, rows, merging, residuals, self.bound)
+            self._new, self._faded = Marks.of((yield from steps(work))), Marks()
+        elif full:
+            self._new = Marks.of(rows)
         if full:
             self.lean = len(state.links)
-        while True:
-            estimate = residuals.estimate(state, state.links.take(rows))
-            choice = choose_above(state, rows, estimate, self.settings, _CLOSER * self.bound)
-            yield True
-            if not isinstance(choice, Choice):
-                break
-            rows = yield from self._refine(residuals.light, choice)
-            rows.sort()
-            residuals = residuals.grown(state, rows)
+        yield from self._refine_new(_CLOSER * self.bound)
         yield from self._refine_beyond()
         gone = unneeded(state.tree, state.links)
         if gone.sum() > _FOLDED * len(gone):
@@ -321,6 +344,38 @@ class Redistribution(RadiositySolver):
             state.fold(gone)
             self.version += 1
             yield True
+
+    def _refine_new(self, bound: float) -> Iterator[bool]:
+        """Refine links that are new until none of them errs by more than `bound`, squared, times area.
+
+        What a link brings otherwise once it is refined is shot at once.
+        """
+        state = self._state
+        residuals, moments = Residuals.of(state), self._known_moments()
+        self._moments = None
+        rows = self._new.rows()
+        yield True
+        while True:
+            estimate = residuals.estimate(state, state.links.take(rows))
+            choice = choose_above(state, rows, estimate, self.settings, bound)
+            yield True
+            if not isinstance(choice, Choice):
+                break
+            lost, before = sent_over(state, choice.links, moments), len(state.links)
+            rows = yield from self._refine(residuals.light, choice)
+            moved = moved_rows(choice.links, len(rows), before)
+            for marks in (self._new, self._faded):
+                marks.replace(choice.links, moved, len(state.links))
+            self._new.mark(rows)
+            rows.sort()
+            moments = moments_of_more(state, moments)
+            brought = sent_over(state, rows, moments)
+            brought[: len(lost)] -= lost
+            state.add_received(brought)
+            self.version += 1
+            residuals = residuals.grown(state, rows)
+        self._moments = moments
+        self._spread_guess()
 
     def _refine_beyond(self) -> Iterator[bool]:
         """Refine what else is needed by the light that has arrived, so that it is settled but once."""
@@ -371,6 +426,7 @@ class Redistribution(RadiositySolver):
             left=np.append(np.cumsum(energy[order][::-1])[::-1], 0.0),
             light=Light(radiosity, reflectance, NOISE_SHARE * self.bound),
         )
+        self._paid = 0
         return self._plan
 
     def _look_again(self, rows: IntArray, doubt: FloatArray, light: Light, moments: FloatArray) -> IntArray:
@@ -434,8 +490,19 @@ class Redistribution(RadiositySolver):
             self._state.add_received(self._arrived)
             self._arrived[...] = 0.0
             self._waits = False
-        self._state.received[self._fresh, 0] -= (self._guessed - self._guessed_now) * self._guess
-        self._guessed = self._guessed_now
+        if self._guessed != self._guessed_now:
+            self._state.received[self._guesses, 0] -= (self._guessed - self._guessed_now) * self._guess
+            self._guessed = self._guessed_now
+
+    def _spread_guess(self) -> None:
+        """What is guessed of patches is guessed of all that has become of them."""
+        patch = self._state.tree.patch
+        place = np.full(self.surfaces.patch_count, -1, dtype=np.int32)
+        place[self._fresh] = np.arange(len(self._fresh), dtype=np.int32)
+        # Patches are the first elements.
+        guess = self._guess[: len(self._fresh)]
+        self._guesses = np.flatnonzero(place[patch] >= 0).astype(np.int32)
+        self._guess = guess[place[patch[self._guesses]]]
 
     def _fresh_since(self, match: Match, earlier: RadiositySolver) -> BoolArray:
         """Patches (p,) that some link in debt has never met."""

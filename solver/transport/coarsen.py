@@ -77,7 +77,7 @@ def coarsen(
         before = len(links)
         merged = int(accepted.sum())
         kept = np.setdiff1d(rows, gone, assume_unique=True)
-        moved = _moves(gone, merged, before)
+        moved = moved_rows(gone, merged, before)
         for _ in links.replace(gone, batches):
             yield
         tried[moved[:, 1]] = tried[moved[:, 0]]
@@ -161,7 +161,7 @@ def _joint_blockers(
     return np.cumsum(counts, dtype=np.int64) - counts, counts, (both % most).astype(np.int32)
 
 
-def _moves(gone: IntArray, filled: int, before: int) -> IntArray:
+def moved_rows(gone: IntArray, filled: int, before: int) -> IntArray:
     """Rows (k, 2) that change places, from and to, when of `gone` rows only the first are filled again."""
     holes = gone[filled:]
     left = before - len(holes)

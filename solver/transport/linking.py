@@ -29,6 +29,9 @@ from solver.visibility.shafts import NONE, PARTIAL
 _CHUNK: Final = 256
 _LEAST: Final = 32
 
+_AGAIN: Final = 4
+"""Rays, in units of 16, that a link takes up to when it is looked at again, if it had more"""
+
 
 @dataclass(frozen=True, eq=False)
 class Light:
@@ -193,8 +196,8 @@ class Linker:
         )  # fmt: skip
         known = np.flatnonzero((kind <= NONE) & ~stays)
         pool = take_ranges(loose, room[known], kept[known])
-        # By the same rays as before, so that only what has changed makes a difference.
-        least = np.where(sampled, samples, 1)[known].astype(np.int32)
+        # By the rays that they had, so that only what has changed makes a difference, unless these are many.
+        least = np.where(sampled, np.minimum(samples, _AGAIN), 1)[known].astype(np.int32)
         batch = self._evaluate(tree, p[known], q[known], kind[known], kept[known], pool, least, light, True)
         same = sampled[known] & (batch.samples == samples[known])
         same &= batch.visibility == links.visibility[rows[known]]
