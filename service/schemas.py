@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.journal.documents import Snapshot
+from service.journal.documents import Gesture, Snapshot
 from solver.document.edits import Edit
 from solver.document.fields import Closed, Direction, Point
 from solver.document.models import SceneDocument
@@ -168,6 +168,11 @@ class EditBatch(Closed):
     edits: list[Edit] = Field(min_length=1)
     if_revision: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
         default=None, description="Refuse the batch with 409 where the scene is at another revision."
+    )
+    gesture: Gesture | None = Field(
+        default=None,
+        description="The client's own name of what the batch is part of, a drag, say: batches of one "
+        "gesture, one right after the other, are undone together.",
     )
 
     model_config = ConfigDict(

@@ -58,8 +58,8 @@ def answer(engine: Engine, request: AnyRequest) -> object:
         case Configure(wanted):
             engine.configure(wanted.changes_to(engine.settings))
             return engine.status()
-        case ApplyEdits(edits, if_revision):
-            changes = engine.apply(edits, if_revision)
+        case ApplyEdits(edits, if_revision, gesture):
+            changes = engine.apply(edits, if_revision, gesture)
             return EditsAnswer(engine.revision, changes)
         case Undo():
             changes = engine.undo()

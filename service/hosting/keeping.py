@@ -18,8 +18,10 @@ _ANSWER: Final = TypeAdapter(EditsAnswer)
 def step_of(request: AnyRequest) -> Step | None:
     """The step that `request` takes; None where it changes nothing that is to last."""
     match request:
-        case ApplyEdits(edits):
+        case ApplyEdits(edits, _, None):
             return EditStep(step="edit", edits=list(edits))
+        case ApplyEdits(edits, _, gesture):
+            return EditStep(step="edit", edits=list(edits), gesture=gesture)
         case Undo():
             return UndoStep(step="undo")
         case Redo():

@@ -94,6 +94,8 @@ class ApplyEdits(Request[EditsAnswer]):
 
     edits: tuple[Edit, ...]
     if_revision: int | None
+    gesture: str | None = None
+    """Batches of one in a row are taken back together."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from solver.document.settings import SettingsDocument
 from solver.engine import change_log, history
 
 _Ordinal: TypeAlias = Annotated[int, Field(strict=True, ge=0, lt=2**53)]
+Gesture: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
 _Batch: TypeAlias = Annotated[list[Edit], Field(min_length=1)]
 _Batches: TypeAlias = Annotated[list[_Batch], Field(max_length=history.KEPT)]
 
@@ -45,6 +46,9 @@ class Snapshot(Closed):
     drags: bool = Field(
         default=False, description="Whether the last entry of the log is an object's that is being moved."
     )
+    gesture: Gesture | None = Field(
+        default=None, description="That the last of `batches` is part of, and edits to come may be."
+    )
 
 
 class EditStep(Closed):
@@ -52,6 +56,7 @@ class EditStep(Closed):
 
     step: Literal["edit"]
     edits: list[Edit]
+    gesture: Gesture | None = None
 
 
 class UndoStep(Closed):

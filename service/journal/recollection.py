@@ -21,7 +21,7 @@ from solver.document.conversion import document_of, scene_of
 from solver.document.edits import Edit, apply_edits
 from solver.document.settings import SettingsDocument
 from solver.engine.change_log import ChangeLog, Progress
-from solver.engine.history import KEPT, Deed, deeds_of, taken_back
+from solver.engine.history import KEPT, Deed, deeds_of, joined, taken_back
 from solver.engine.past import Batch, Past
 from solver.engine.status import Change, ChangeState
 from solver.illumination.settings import LightSettings
@@ -38,6 +38,7 @@ class Recollection:
         """Of batches that cannot be taken back any more"""
         self._batches: list[Batch] = [tuple(batch) for batch in snapshot.batches]
         self._undone: list[Batch] = [tuple(batch) for batch in snapshot.undone]
+        self._gesture = snapshot.gesture
         self._settings = snapshot.settings.changes_to(LightSettings())
         self._revision = snapshot.revision
         self._log = ChangeLog([_change(entry) for entry in snapshot.log], snapshot.entries, snapshot.drags)
@@ -59,6 +60,7 @@ class Recollection:
             entries=self._log.entries(_UNKNOWN),
             count=self._log.count,
             drags=self._log.drags,
+            gesture=self._gesture,
         )
 
     def snapshot(self) -> Snapshot:
@@ -70,13 +72,18 @@ class Recollection:
             case ConfigureStep():
                 self._settings = step.settings.changes_to(self._settings)
             case EditStep():
-                self._batches.append(tuple(step.edits))
+                joins = step.gesture is not None and step.gesture == self._gesture and bool(self._batches)
+                first = self._batches.pop() if joins else ()
+                self._batches.append(joined(first, step.edits))
                 self._undone.clear()
+                self._gesture = step.gesture
                 self._tell(deeds_of(step.edits))
             case UndoStep():
+                self._gesture = None
                 self._undone.append(self._batches.pop())
                 self._tell(taken_back(deeds_of(self._undone[-1])))
             case RedoStep():
+                self._gesture = None
                 self._batches.append(self._undone.pop())
                 self._tell(deeds_of(self._batches[-1]))
         while len(self._batches) > KEPT:
@@ -106,6 +113,7 @@ def snapshot_of(past: Past, settings: LightSettings) -> Snapshot:
         log=[_logged(change) for change in past.entries],
         entries=past.count,
         drags=past.drags,
+        gesture=past.gesture,
     )
 
 

@@ -150,7 +150,8 @@ export class Gizmo {
 class Flow {
   #latest = null;
   #isBusy = false;
-  #joins = false;
+  // Of this page and this drag alone.
+  #gesture = `drag ${Math.random().toString(36).slice(2)}`;
 
   constructor(session, id) {
     this.session = session;
@@ -173,10 +174,8 @@ class Flow {
     this.#isBusy = true;
     const transform = this.#latest;
     this.#latest = null;
-    const joins = this.#joins;
-    this.#joins = true;
     const pause = this.hasEnded ? null : new Promise((resolve) => { setTimeout(resolve, INTERVAL); });
-    await this.session.edit([{ op: "move", id: this.id, transform }], { joins });
+    await this.session.edit([{ op: "move", id: this.id, transform }], this.#gesture);
     await pause;
     this.#isBusy = false;
     this.#send();

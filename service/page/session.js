@@ -11,9 +11,6 @@ export class Session extends EventTarget {
   #log = { looking: false, again: false, timer: 0 };
   #sceneRevision = 0;
   #fetching = false;
-  // How many batches belong together: what one drag did is taken back at once.
-  #past = [];
-  #future = [];
   #deeds = Promise.resolve();
   #closed = new AbortController();
 
@@ -58,25 +55,18 @@ export class Session extends EventTarget {
     return this.objects.find((object) => object.id === id) ?? null;
   }
 
-  get canUndo() { return this.#past.length > 0; }
-
-  get canRedo() { return this.#future.length > 0; }
-
-  /** Apply edits; with `joins`, they are undone together with those before. Resolves to whether it went well. */
-  edit(edits, { joins = false } = {}) {
+  /** Apply edits; those of one gesture are undone together. Resolves to whether it went well. */
+  edit(edits, gesture = null) {
     for (const edit of edits) this.#anticipate(edit);
     this.#tell("scene");
-    return this.#do(async () => {
-      await this.stream.ask({ type: "edits", edits });
-      if (joins && this.#past.length) this.#past.push(this.#past.pop() + 1);
-      else this.#past.push(1);
-      this.#future = [];
-    });
+    return this.#do(() => this.stream.ask({ type: "edits", edits, ...(gesture && { gesture }) }));
   }
 
-  undo() { return this.#reverse("undo", this.#past, this.#future); }
+  /** Take back the newest deed, whoever did it. */
+  undo() { return this.#do(() => this.stream.ask({ type: "undo" })); }
 
-  redo() { return this.#reverse("redo", this.#future, this.#past); }
+  /** Bring back what was taken back last. */
+  redo() { return this.#do(() => this.stream.ask({ type: "redo" })); }
 
   async configure(settings) {
     try {
@@ -84,15 +74,6 @@ export class Session extends EventTarget {
     } catch (error) {
       this.#tell("problem", error);
     }
-  }
-
-  /** Undo what this page has done, or, where it has done nothing, the newest batch of anybody's. */
-  #reverse(type, from, to) {
-    return this.#do(async () => {
-      const count = from.pop() ?? 1;
-      for (let done = 0; done < count; done += 1) await this.stream.ask({ type });
-      to.push(count);
-    });
   }
 
   // One deed after the other, so that undo finds what came before it.

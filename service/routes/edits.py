@@ -31,7 +31,8 @@ async def apply_edits(
     """
     if len(body.edits) > context.settings.max_edits:
         raise LimitExceededError("edits", len(body.edits), context.settings.max_edits)
-    answer = await _once(session, ApplyEdits(tuple(body.edits), body.if_revision), idempotency_key)
+    request = ApplyEdits(tuple(body.edits), body.if_revision, body.gesture)
+    answer = await _once(session, request, idempotency_key)
     for edit in body.edits:
         context.metrics.edits.labels(edit.op).inc()
     return EditsAnswer(revision=answer.revision, changes=[LogEntry.of(change) for change in answer.changes])

@@ -135,8 +135,10 @@ class Engine:
         """What the solve goes by."""
         return self._settings
 
-    def apply(self, edits: Sequence[Edit], if_revision: int | None = None) -> tuple[Change, ...]:
-        """Apply all of `edits`, or none.
+    def apply(
+        self, edits: Sequence[Edit], if_revision: int | None = None, gesture: str | None = None
+    ) -> tuple[Change, ...]:
+        """Apply all of `edits`, or none. Batches of one `gesture` in a row are taken back together.
 
         Raises RevisionConflictError where `if_revision` is given and not the current one, SceneError
         located in `edits.<index>`, LimitExceededError.
@@ -147,7 +149,7 @@ class Engine:
         self._limits.check(scene)
         step = step_of(edits, scene)
         changes = self._take(step)
-        self._history.record(before, step)
+        self._history.record(before, step, gesture)
         return changes
 
     def undo(self) -> tuple[Change, ...]:

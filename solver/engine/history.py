@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, TypeVar
 
 from solver.document.edits import Edit
 from solver.errors import SolverError
@@ -38,6 +38,18 @@ class Deed:
     object_id: ObjectId
 
 
+class _Told(Protocol):
+    """What has an operation and an object: a deed, or an edit."""
+
+    @property
+    def op(self) -> str: ...
+    @property
+    def object_id(self) -> ObjectId: ...
+
+
+T = TypeVar("T", bound=_Told)
+
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """From one scene to another."""
@@ -50,28 +62,43 @@ class Step:
 class History:
     """The steps that led to the scene as it stands, and those that were taken back."""
 
-    def __init__(self) -> None:
+    def __init__(self, gesture: str | None = None) -> None:
+        """Nothing has happened yet; what does by `gesture` joins the newest step, if there is one."""
         self._past: deque[tuple[Scene, Step]] = deque(maxlen=KEPT)
         self._future: list[tuple[Scene, Step]] = []
+        self._gesture = gesture
 
     @classmethod
-    def of(cls, past: Iterable[tuple[Scene, Step]], future: Iterable[tuple[Scene, Step]]) -> History:
+    def of(
+        cls,
+        past: Iterable[tuple[Scene, Step]],
+        future: Iterable[tuple[Scene, Step]],
+        gesture: str | None = None,
+    ) -> History:
         """The history of steps, each with the scene before it: those that stand, oldest first, and those that
-        were taken back, the latest last."""
-        history = cls()
+        were taken back, the latest last. The newest was part of `gesture`."""
+        history = cls(gesture)
         history._past.extend(past)
         history._future.extend(future)
         return history
 
-    def record(self, before: Scene, step: Step) -> None:
-        """Take in a step of the client's own; what was taken back before cannot be brought back any more."""
+    def record(self, before: Scene, step: Step, gesture: str | None = None) -> None:
+        """Take in a step of the client's own; what was taken back before cannot be brought back any more.
+
+        One of the same `gesture` as the one before is taken back together with that.
+        """
+        if gesture is not None and gesture == self._gesture and self._past:
+            before, first = self._past.pop()
+            step = Step(step.scene, joined(first.deeds, step.deeds))
         self._past.append((before, step))
         self._future.clear()
+        self._gesture = gesture
 
     def undo(self) -> Step:
         """The step that takes back the newest batch. Raises NothingToReverseError."""
         if not self._past:
             raise NothingToReverseError("undo")
+        self._gesture = None
         before, step = self._past.pop()
         self._future.append((before, step))
         return Step(before, taken_back(step.deeds))
@@ -80,9 +107,22 @@ class History:
         """The step that brings back what was taken back last. Raises NothingToReverseError."""
         if not self._future:
             raise NothingToReverseError("redo")
+        self._gesture = None
         before, step = self._future.pop()
         self._past.append((before, step))
         return step
+
+
+def joined(first: Sequence[T], second: Sequence[T]) -> tuple[T, ...]:
+    """Edits or deeds, one after the other; of several moves of an object in a row, say, the last."""
+    whole: list[T] = []
+    for each in (*first, *second):
+        last = whole[-1] if whole else None
+        is_like = last is not None and (each.op, each.object_id) == (last.op, last.object_id)
+        if is_like and each.op not in _INVERSE:
+            whole.pop()
+        whole.append(each)
+    return tuple(whole)
 
 
 def step_of(edits: Sequence[Edit], scene: Scene) -> Step:

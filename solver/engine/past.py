@@ -37,6 +37,8 @@ class Past:
     """Entries that there ever were"""
     drags: bool = False
     """Whether the last entry stands for an object that may be moved on"""
+    gesture: str | None = None
+    """That the newest of `batches` is part of, and what follows may be"""
 
     def history(self, limits: SceneLimits) -> tuple[History, Scene]:
         """The history, and the scene as it stands.
@@ -48,7 +50,7 @@ class Past:
         past, standing = _steps(self.scene, self.batches, places, limits)
         places = [("undone", index) for index in range(len(self.undone))]
         future, _ = _steps(standing, self.undone[::-1], places[::-1], limits)
-        return History.of(past, future[::-1]), standing
+        return History.of(past, future[::-1], self.gesture), standing
 
 
 def _steps(
