@@ -22,6 +22,11 @@ _GRACE: Final = 5
 """Seconds that requests are given to end when the server does."""
 
 
+_KEPT: Final = 75
+"""Seconds that a connection may rest between two requests: longer than clients keep theirs, lest one be hung
+up while a request is on its way"""
+
+
 class Server(uvicorn.Server):
     """A server that tells its address when it is ready, and ends its sessions before it waits for requests.
 
@@ -36,6 +41,7 @@ class Server(uvicorn.Server):
                 log_level="warning",
                 access_log=False,
                 timeout_graceful_shutdown=_GRACE,
+                timeout_keep_alive=_KEPT,
                 http=patient(self._context.settings.head_seconds),
                 ws_max_size=self._context.settings.max_message_bytes,
                 ws_per_message_deflate=False,  # frames are compressed already
