@@ -35,6 +35,28 @@ T = TypeVar("T")
 _SCENES: Final = ("cornell", "cube_room")
 _SIZE: Final[dict[str, str | int]] = {"width": 320, "height": 240, "format": "jpeg"}
 _PATIENCE: Final = 120.0
+_TOLD: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Parts of the time after which memory is told"""
+
+_WEIGHED: Final = 5.0
+"""Seconds between two looks at memory: each takes the system milliseconds a process."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """MB of a service, what processes share counted once."""
+
+    web: float
+    """Of the process that serves"""
+    workers: int
+    all: float
+
+    @staticmethod
+    def of(service: int) -> Memory:
+        """As it is now."""
+        workers = _workers(service)
+        web = _shared_out(service)
+        return Memory(web, len(workers), web + sum(map(_shared_out, (*_children(service), *workers))))
 
 
 @dataclass
@@ -44,8 +66,8 @@ class Tally:
     seconds: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """Of each kind of request that succeeded"""
     failures: Counter[str] = field(default_factory=Counter)
-    memory: list[float] = field(default_factory=list)
-    """MB of all processes together, every second"""
+    memory: list[Memory] = field(default_factory=list)
+    """As time goes by"""
     kills: int = 0
 
     def table(self) -> str:
@@ -58,8 +80,10 @@ class Tally:
         failed = ", ".join(f"{count} {what}" for what, count in self.failures.items()) or "none"
         lines.append(f"failures: {failed}; workers killed: {self.kills}")
         if self.memory:
-            half = self.memory[len(self.memory) // 2 :]
-            lines.append(f"memory: {half[0]:.0f} MB half way, {half[-1]:.0f} MB at the end")
+            told = [self.memory[round(part * (len(self.memory) - 1))] for part in _TOLD]
+            lines.append("MB of all: " + ", ".join(f"{found.all:.0f}" for found in told))
+            lines.append("MB of the process that serves: " + ", ".join(f"{found.web:.0f}" for found in told))
+            lines.append("workers: " + ", ".join(str(found.workers) for found in told))
         return "\n".join(lines)
 
 
@@ -89,7 +113,7 @@ class Visitor:
     async def stay(self, until: float) -> None:
         """Edit and look, until then."""
         while time.monotonic() < until:
-            await (self._look() if self._chance.random() < 0.6 else self._paint())
+            await self._chance.choices((self._look, self._paint, self._move, self._undo), (12, 5, 2, 1))[0]()
             await asyncio.sleep(self._chance.uniform(0.05, 0.4))
 
     async def check(self) -> list[str]:
@@ -105,14 +129,32 @@ class Visitor:
         return wrong
 
     async def _look(self) -> None:
-        await self._timed("frame", self._http.get(f"{self._path}/frame", params=_SIZE))
+        renderer = self._chance.choice(("interpolant", "gouraud", "flat"))
+        asked = {**_SIZE, "renderer": renderer, "vertical_fov": round(self._chance.uniform(30.0, 60.0), 1)}
+        await self._timed("frame", self._http.get(f"{self._path}/frame", params=asked))
 
     async def _paint(self) -> None:
         id, grey = self._chance.choice(self._ids), round(self._chance.uniform(0.1, 0.8), 6)
         edit = {"op": "set_material", "id": id, "material": {"reflectance": [grey] * 3}}
+        if await self._edit(edit):
+            self._greys[id] = grey
+
+    async def _move(self) -> None:
+        offset = [round(self._chance.uniform(-0.02, 0.02), 6) for _ in range(3)]
+        await self._edit({"op": "move", "id": self._ids[-1], "transform": {"translation": offset}})
+
+    async def _undo(self) -> None:
+        """Move something, and take that back."""
+        await self._move()
+        answer = await self._timed("undo", self._http.post(f"{self._path}/undo"))
+        if answer is not None:
+            self._revision = answer.json()["revision"]
+
+    async def _edit(self, edit: dict[str, Any]) -> bool:
         answer = await self._timed("edit", self._http.post(f"{self._path}/edits", json={"edits": [edit]}))
         if answer is not None:
-            self._greys[id], self._revision = grey, answer.json()["revision"]
+            self._revision = answer.json()["revision"]
+        return answer is not None
 
     async def _timed(self, kind: str, request: Awaitable[httpx.Response]) -> httpx.Response | None:
         start = time.perf_counter()
@@ -136,7 +178,7 @@ async def load(sessions: int, seconds: float, kill: float | None, directory: Pat
         for visitor in visitors:
             await visitor.arrive()
         until = time.monotonic() + seconds
-        others = [asyncio.create_task(_every(1.0, lambda: tally.memory.append(_memory(process.pid))))]
+        others = [asyncio.create_task(_weigh(process.pid, tally))]
         if kill is not None:
             chance = random.Random(1)
             others.append(asyncio.create_task(_every(kill, lambda: _kill(process.pid, tally, chance))))
@@ -186,16 +228,20 @@ def _workers(service: int) -> list[int]:
     return [worker for nursery in _children(service) for worker in _children(nursery)]
 
 
-def _memory(service: int) -> float:
-    """MB of a service's processes; what they share is counted once."""
-    kilobytes = 0
-    for pid in (service, *_children(service), *_workers(service)):
-        try:
-            told = Path(f"/proc/{pid}/smaps_rollup").read_text()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        kilobytes += sum(int(found) for found in re.findall(r"^Pss:\s+(\d+) kB", told, re.MULTILINE))
-    return kilobytes * 1.024e-3
+async def _weigh(service: int, tally: Tally) -> None:
+    while True:
+        tally.memory.append(await asyncio.to_thread(Memory.of, service))
+        await asyncio.sleep(_WEIGHED)
+
+
+def _shared_out(process: int) -> float:
+    """MB of a process; what several share, in equal parts."""
+    try:
+        told = Path(f"/proc/{process}/smaps_rollup").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    found = re.search(r"^Pss:\s+(\d+) kB", told, re.MULTILINE)
+    return 0.0 if found is None else 1.024e-3 * int(found[1])
 
 
 def main(
