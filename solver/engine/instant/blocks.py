@@ -7,6 +7,7 @@ aside for; others look around again whenever they are needed.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,7 @@ from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.illumination.particles.sights import Sights, look_around
 from solver.illumination.particles.thinning import PATHS, thinned
 from solver.illumination.particles.walk import ParticleWalk
+from solver.transport.pace import finish
 from solver.types import Float32Array, FloatArray
 
 FIRST: Final = 8
@@ -36,6 +38,9 @@ MOST: Final = 1024
 
 BATCH: Final = 16
 """Lights that are lit with at once."""
+
+MOST_WALKED: Final = 1 << 19
+"""Reflections of all paths that are walked at once, about: bounds memory where surfaces are white."""
 
 SIGHT_BYTES: Final = 256 * 2**20
 """Memory for what lights see, of one session."""
@@ -108,10 +113,17 @@ class LightBlocks:
 
     def block(self, number: int) -> LightBlock:
         """The block `number`, which is walked if it is new."""
+        return finish(self.block_in_steps(number))
+
+    def block_in_steps(self, number: int) -> Generator[None, None, LightBlock]:
+        """As `block`; yields every few milliseconds."""
         if number not in self._blocks:
             paths = block_paths(number)
             surfaces = self.world.surfaces
-            walked = self._walk.block(PATHS * first_path(number), PATHS * paths)
+            room = MOST_WALKED * (1.0 - self._walk.mean_reflectivity)
+            each = max(1, min(PATHS, int(room / paths)))
+            walked = yield from self._walk.block_in_steps(PATHS * first_path(number), each * paths)
+            yield
             lights = thinned(walked, surfaces, paths, self._seed)
             order = np.random.default_rng((self._seed, number)).permutation(len(lights)).astype(np.int32)
             lights = clear_of_walls(lights.take(order), surfaces)

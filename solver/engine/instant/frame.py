@@ -190,7 +190,7 @@ class InstantFrame:
 
     def _shine(self, image: Image, number: int) -> Iterator[None]:
         """Collect the light of a block."""
-        block = self._blocks.block(number)
+        block = yield from self._blocks.block_in_steps(number)
         yield
         bound = self._settings.bound
         for batch in range(len(block.sights)):

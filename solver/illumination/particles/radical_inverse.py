@@ -69,8 +69,14 @@ def _fill(base: int, unit: int, start: int, out: FloatArray) -> None:
             mirrored = count_on(base, unit, mirrored)
 
 
-@lru_cache(maxsize=8)
 def first_primes(count: int) -> Int64Array:
+    """The first `count` primes (count,)."""
+    # Walks ask for two more at every reflection.
+    return _sieve(1 << max(count - 1, 0).bit_length())[:count]
+
+
+@lru_cache(maxsize=8)
+def _sieve(count: int) -> Int64Array:
     """The first `count` primes (count,), by Eratosthenes' sieve."""
     # The n-th is below n (log n + log log n) from n = 6 on (Rosser and Schoenfeld 1962).
     n = max(count, 6)

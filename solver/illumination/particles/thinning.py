@@ -29,6 +29,9 @@ from solver.types import LUMINANCE_WEIGHTS, FloatArray, Int64Array
 PATHS: Final = 64
 """Paths walked for each that is kept."""
 
+MOST_LIGHTS: Final = 32
+"""Reflected lights for each path, at most: in white rooms there would be one for each of thousands."""
+
 _MOST_MORE: Final = 2.0
 """Lights there may be for each that there would be without gloss"""
 
@@ -40,9 +43,9 @@ def thinned(lights: VirtualLights, surfaces: Surfaces, paths: int, seed: int = 0
     """As many of the `lights` of `lights.paths` paths as `paths` paths would have left; right in the mean.
 
     On emitters those of the first `paths` paths are kept. Where lights are glossy there are up to twice as
-    many reflected ones.
+    many reflected ones; `MOST_LIGHTS` bounds them before that.
     """
-    if paths >= lights.paths:
+    if paths >= lights.paths and len(lights) <= (1 + MOST_LIGHTS) * paths:
         return lights
     first = int(lights.path.min()) if len(lights) > 0 else 0
     emitted = np.flatnonzero((lights.generation == 0) & (lights.path < first + paths))
@@ -54,7 +57,7 @@ def thinned(lights: VirtualLights, surfaces: Surfaces, paths: int, seed: int = 0
     if len(reflected) == 0 or total <= 0.0:
         return replace(kept, paths=paths)
     reflected, luminance = _along_curve(lights, surfaces, reflected, luminance)
-    count = max(1, round(paths * float(luminance.sum()) / total))
+    count = max(1, round(paths * min(float(MOST_LIGHTS), float(luminance.sum()) / total)))
     # Of lights with lobes more are drawn, and of all together as many more as there may be.
     weighed = luminance * np.sqrt(1.0 + 0.5 * np.maximum(lights.gloss[reflected], 0.0))
     count = round(count * min(_MOST_MORE, float(weighed.sum() / luminance.sum())))

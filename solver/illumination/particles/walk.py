@@ -24,6 +24,7 @@ glossy light is left.
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -74,12 +75,24 @@ class ParticleWalk:
         With `absorb_at_random` a block may be a part of an estimate of `among` paths, down to one path.
         Raises ValueError for indices that have no Halton point, and for parts without that setting.
         """
+        work = self.block_in_steps(first, count, among)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                lights: VirtualLights = end.value
+                return lights
+
+    def block_in_steps(
+        self, first: int, count: int, among: int | None = None
+    ) -> Generator[None, None, VirtualLights]:
+        """As `block`; yields after every reflection; where surfaces are white there are thousands."""
         paths = count if among is None else among
         if not 1 <= count <= paths:
             raise ValueError(f"a block has 1 path at least and its estimate at most, not {count} of {paths}")
         if count < paths and not self.settings.absorb_at_random:
             raise ValueError("paths depend on each other unless they are absorbed at random")
-        return _Block(self, first, count, paths).lights()
+        return (yield from _Block(self, first, count, paths).lights())
 
 
 def mean_reflectivity(surfaces: Surfaces) -> float:
@@ -111,8 +124,8 @@ class _Block:
         self._paths = paths
         self._particles = Particles.allocate(count)
 
-    def lights(self) -> VirtualLights:
-        """Walk all paths to their ends."""
+    def lights(self) -> Generator[None, None, VirtualLights]:
+        """Walk all paths to their ends; yields after every reflection."""
         walk, rows = self._walk, self._begin()
         parts = [self._leave_lights(rows, 0, self._paths)]
         generation, expected = 0, float(self._paths)
@@ -129,6 +142,7 @@ class _Block:
             if expected < 1.0 and not walk.settings.absorb_at_random:
                 rows = self._absorbed(rows, generation, self._worth(rows))
             parts += [*glossy, self._leave_lights(rows, generation, share)]
+            yield
 
     def _begin(self) -> Int64Array:
         """Place particles on emitters, if there are any, and tell which there are."""

@@ -11,7 +11,7 @@ from solver.illumination.particles.lighting import add_light
 from solver.illumination.particles.lights import VirtualLights, join
 from solver.illumination.particles.receivers import Polygons, Receivers
 from solver.illumination.particles.sights import look_around
-from solver.illumination.particles.thinning import PATHS, thinned
+from solver.illumination.particles.thinning import MOST_LIGHTS, PATHS, thinned
 from solver.types import LUMINANCE_WEIGHTS, FloatArray, IntArray, Points
 from tests.illumination.particles.rooms import (
     CEILING_LIGHT,
@@ -192,3 +192,16 @@ def test_the_seed_decides() -> None:
     a, b, c = (thinned(walked, COLOURED.surfaces, 8, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(a.position, b.position)
     assert not np.array_equal(a.position, c.position)
+
+
+def test_lights_of_white_rooms_are_bounded() -> None:
+    """As many as 32 for each path, however often that is reflected; of the same power in all."""
+    of = cube(*(material(0.99, 10.0 if k == 1 else 0.0) for k in range(6)))
+    for more in (1, 4):
+        walked = of.block(8 * more)
+        emitted, reflected = split(thinned(walked, of.surfaces, 8))
+        assert len(emitted.power) == 8 and len(reflected.power) == 8 * MOST_LIGHTS
+        before, after = (
+            split(lights)[1].power.sum(axis=0) for lights in (walked, thinned(walked, of.surfaces, 8))
+        )
+        np.testing.assert_allclose(after, before, rtol=1e-6)
