@@ -21,7 +21,7 @@ TOLERANCE: Final = 0.05
 SETTINGS: Final = LightSettings(error_tolerance=TOLERANCE, max_paths=32, vpl_resolution=32)
 
 LONGEST: Final = 120.0
-"""Seconds within which anything here is done, on a machine that is busy with other things."""
+"""Seconds of the processor within which anything here is done, unless it says so."""
 
 MOST_BYTES: Final = 1 << 28
 """That a solution of a small scene may hold"""
@@ -40,26 +40,28 @@ _PROBED: Final = 100
 _PATHS: Final = 1 << 13
 
 
-def solve(scene: Scene, drawing: Drawing, settings: LightSettings = SETTINGS) -> Engine:
+def solve(
+    scene: Scene, drawing: Drawing, settings: LightSettings = SETTINGS, longest: float = LONGEST
+) -> Engine:
     """The engine of a scene, when it has nothing to do."""
-    return settle(Engine(scene, settings, drawing=drawing))
+    return settle(Engine(scene, settings, drawing=drawing), longest)
 
 
-def settle(engine: Engine) -> Engine:
+def settle(engine: Engine, longest: float = LONGEST) -> Engine:
     """The engine, when it has nothing to do, which is to be in time."""
-    start = time.perf_counter()
+    start = time.process_time()
     while engine.step(0.1):
-        assert time.perf_counter() - start < LONGEST, "time is bounded"
+        assert time.process_time() - start < longest, "time is bounded"
     return engine
 
 
 def complete(engine: Engine, renderer: RendererName) -> FloatArray:
     """The frame (h, w, 3) of the scene's camera, once it cannot get better."""
     request = FrameRequest(renderer=renderer)
-    start = time.perf_counter()
+    start = time.process_time()
     while engine.outlook(request).improving:
         engine.step(0.1)
-        assert time.perf_counter() - start < LONGEST, "time is bounded"
+        assert time.process_time() - start < LONGEST, "time is bounded"
     return np.asarray(engine.frame(request).image, dtype=np.float64)
 
 

@@ -60,8 +60,10 @@ def test_an_open_white_room(reflectance: float, drawing: Drawing) -> None:
     assert absorbed / emitted == pytest.approx((0.16 + walls) / (0.32 + walls), abs=0.15)
 
 
-def test_a_white_room_seen_by_virtual_lights(drawing: Drawing) -> None:
-    engine = solve(scene(room(0.99), lamp()), drawing)
+@pytest.mark.parametrize("reflectance", [0.99, pytest.param(0.999, marks=pytest.mark.slow)])
+def test_a_white_room_seen_by_virtual_lights(reflectance: float, drawing: Drawing) -> None:
+    """Paths of thousands of reflections, of which few leave lights."""
+    engine = solve(scene(room(reflectance), lamp()), drawing)
     shown, flat = complete(engine, RendererName.VPL), complete(engine, RendererName.FLAT)
     assert np.isfinite(shown).all()
     assert shown.mean() == pytest.approx(flat.mean(), rel=0.2)

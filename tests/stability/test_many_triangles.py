@@ -49,7 +49,7 @@ def test_a_ball_of_1280_triangles_from_inside(drawing: Drawing) -> None:
 @pytest.mark.slow
 def test_a_ball_of_20480_triangles(drawing: Drawing) -> None:
     """Too many to be linked: the light is sampled, and it is told."""
-    engine = solve(scene(room(), lamp(), ball("ball", 5, GREY, radius=0.25)), drawing)
+    engine = solve(scene(room(), lamp(), ball("ball", 5, GREY, radius=0.25)), drawing, longest=10.0 * LONGEST)
     status = engine.status()
     assert status.state is SessionState.CONVERGED and status.error_estimate <= TOLERANCE
     assert status.statistics.memory_bytes < MOST_BYTES
