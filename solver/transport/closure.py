@@ -25,7 +25,10 @@ from solver.types import FloatArray, Int64Array
 from solver.visibility.rays import RayScene
 
 PROBES: Final = 16384
-_STEPS: Final = 2
+_STEPS: Final = 5
+"""At most, in an open scene; each halves what a patch has too much, where others have too little"""
+_EXCESS: Final = 1e-3
+"""Of the sum of a patch, that is left alone"""
 _MOST_REFLECTED: Final = 0.995
 """Where balance is strict, no leaf reflects more than this share of a uniform field."""
 
@@ -99,7 +102,7 @@ def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterat
             of_patch = total / tree.area[: tree.patch_count]
             target = np.where(leaf, row_sum / np.maximum(of_patch, 1.0)[tree.patch], row_sum)
         off = target != row_sum
-        if not off.any():
+        if not (row_sum > (1.0 + _EXCESS) * target).any():
             return
         state.closure[off] *= np.sqrt(target[off] / row_sum[off])
     if closed:

@@ -111,7 +111,10 @@ def test_frames_converge_and_then_rest(instant: Engine) -> None:
 
 @pytest.mark.parametrize("samples", [1, 4, 16])
 def test_the_estimate_is_about_the_error(drawing: Drawing, samples: int) -> None:
-    """Against frames of eight times as many paths at least; of colours that are reflected alone."""
+    """Against frames of eight times as many paths at least; of colours that are reflected alone.
+
+    The estimate is to be no less than the error in most scenes (`spread.SAFETY`), and so is more in these.
+    """
     ratios = []
     for scene, size in ((box(), 32), (load_sample("cornell"), 24)):
         engine = Engine(scene, replace(QUICK, vpl_resolution=24), drawing=drawing)
@@ -124,8 +127,8 @@ def test_the_estimate_is_about_the_error(drawing: Drawing, samples: int) -> None
         for image, estimate in shots[:2]:
             seen = np.ones_like(lamp) if scene.name == "box" else ~lamp
             ratios.append(difference(image[seen], truth[seen]) / estimate)
-    assert max(ratios) < 1.5, ratios
-    assert min(ratios) > 0.4, ratios
+    assert max(ratios) < 1.0, ratios
+    assert min(ratios) > 0.2, ratios
 
 
 def test_errors_fall_as_paths_grow(instant: Engine) -> None:

@@ -70,11 +70,16 @@ def lit_cube(reflectance: Rgb = 0.5, emission: Rgb = 1.0) -> World:
     )
 
 
-def furnace(reflectance: float, emission: float = 1.0) -> World:
-    """A closed box with a block that floats in it, all of one material."""
+def furnace(reflectance: float, emission: float = 1.0, shift: float = 0.0) -> World:
+    """A closed box with a block that floats in it, all of one material, moved by `shift` metres along x.
+
+    Rays depend on where elements are: that is another draw of them.
+    """
+    low, high = np.array([0.3, 0.25, 0.35]), np.array([0.6, 0.7, 0.65])
+    x = np.array([shift, 0.0, 0.0])
     return world(
-        box("room", reflectance, emission),
-        box("block", reflectance, emission, (0.3, 0.25, 0.35), (0.6, 0.7, 0.65), inward=False),
+        box("room", reflectance, emission, x, x + 1.0),
+        box("block", reflectance, emission, low + x, high + x, inward=False),
     )
 
 
