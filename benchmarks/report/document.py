@@ -7,7 +7,7 @@ from typing import Final
 
 from benchmarks.calibration import section as calibration
 from benchmarks.report import profile
-from benchmarks.report.front import GOALS, NEVER, Reached, chosen, reached, reached_by_noise
+from benchmarks.report.front import GOALS, NEVER, Reached, chosen, reached, told
 from benchmarks.report.peers import DENOISED, RAW
 from benchmarks.report.plots import has_plots, plot_name, plot_scaling, plot_trials
 from benchmarks.report.runs import Run, missing_of, profiles_of, sizes_of, trials_of
@@ -84,10 +84,7 @@ def headline(runs: dict[str, Run]) -> Table:
     for scene in JUDGED:
         for case in Case:
             ours = reached(chosen(trials, scene, case), _GOAL)
-            theirs = {
-                name: reached_by_noise(chosen(trials, scene, Case.COLD, name), _GOAL)
-                for name in (DENOISED, RAW)
-            }
+            theirs = {name: told(chosen(trials, scene, Case.COLD, name), _GOAL) for name in (DENOISED, RAW)}
             cells = (
                 scene,
                 "from the scene on" if case is Case.COLD else "after a small edit",
@@ -106,7 +103,8 @@ def headline(runs: dict[str, Run]) -> Table:
         "Time to 1 % error, 640x480",
         ("scene", "clock", "by", "seconds", f"{DENOISED}: seconds", "times", f"{RAW}: seconds", "times"),
         tuple(rows),
-        "~: extrapolated by 1 / sqrt(samples) from the last picture there was time for. -: not reached.",
+        "~: extrapolated by 1 / sqrt(samples) from the last picture there was time for. >: not reached by "
+        "then. -: not reached, or not measured.",
         names=3,
     )
 
@@ -133,8 +131,8 @@ def _renderpark(trials: list[Trial]) -> Table:
 
 
 def _head(runs: dict[str, Run]) -> str:
-    told = sorted({(run.machine, run.peers) for run in runs.values()})
-    machines = "\n".join(f"- {machine}{'; ' + peers if peers else ''}" for machine, peers in told)
+    ran = sorted({(run.machine, run.peers) for run in runs.values()})
+    machines = "\n".join(f"- {machine}{'; ' + peers if peers else ''}" for machine, peers in ran)
     measured = Table(
         "What was measured when",
         ("section", "form", "commit", "day", "seconds"),
@@ -150,8 +148,8 @@ def _head(runs: dict[str, Run]) -> str:
 
 def _ratios(runs: dict[str, Run], trials: list[Trial]) -> str:
     missing = "" if any(trial.is_peer for trial in trials) else missing_of(runs)
-    told = f"Peers: {missing}.\n" if missing else ""
-    return "\n".join(["## Beside peers", "", told, headline(runs).markdown(), _renderpark(trials).markdown()])
+    note = f"Peers: {missing}.\n" if missing else ""
+    return "\n".join(["## Beside peers", "", note, headline(runs).markdown(), _renderpark(trials).markdown()])
 
 
 def _times(trials: list[Trial]) -> str:
@@ -162,8 +160,7 @@ def _times(trials: list[Trial]) -> str:
             names = dict.fromkeys(t.renderer for t in trials if t.scene == scene and t.case is case)
             for name in names:
                 known = chosen(trials, scene, case, name)
-                law = reached_by_noise if known[0].is_peer or name == "path" else reached
-                times = (text_of(law(known, goal)) for goal in GOALS)
+                times = (text_of(told(known, goal)) for goal in GOALS)
                 rows.append(Row((scene, name, *times)))
         columns = ("scene", "renderer", *(percent(goal, 0) for goal in GOALS))
         title = "From the scene's text on" if case is Case.COLD else "From a small edit on"
@@ -188,8 +185,8 @@ def _tables(runs: dict[str, Run]) -> str:
         parts += [f"![told against true](performance/{calibration.PLOT})", ""]
     if "savings" in runs:
         parts += ["## What is spared", "", runs["savings"].table]
-    told = (*REPORTED, "calibration", "savings")
-    others = [run.table for name, run in runs.items() if name not in told]
+    above = (*REPORTED, "calibration", "savings")
+    others = [run.table for name, run in runs.items() if name not in above]
     if others:
         parts += ["## Other measurements", "", *others]
     return "\n".join(parts)
@@ -201,5 +198,5 @@ def _table_of(name: str, runs: dict[str, Run]) -> Table:
         return tabulate_scaling(sizes_of(runs))
     if name == "profile":
         return profile.tabulate([profile.Profiles(tuple(profiles_of(runs)))])
-    told = Trials(tuple(trials_of({name: runs[name]})), missing_of(runs) if name == "peers" else "")
-    return {"cold": tabulate_cold, "edited": tabulate_edited, "peers": tabulate_peers}[name]([told])
+    found = Trials(tuple(trials_of({name: runs[name]})), missing_of(runs) if name == "peers" else "")
+    return {"cold": tabulate_cold, "edited": tabulate_edited, "peers": tabulate_peers}[name]([found])

@@ -12,6 +12,9 @@ from benchmarks.report.trials import Case, Shot, Trial
 GOALS: Final = (0.05, 0.02, 0.01)
 """Errors to which the time is told"""
 
+NOISY: Final = ("path", "Mitsuba path")
+"""Renderers whose error is noise, and nothing else"""
+
 
 @dataclass(frozen=True)
 class Reached:
@@ -21,7 +24,8 @@ class Reached:
     """Infinite where it is not"""
     trial: Trial | None
     """By which"""
-    is_extrapolated: bool = False
+    sign: str = ""
+    """Of what is not measured: ~ where the time is extrapolated, > where it is a lower bound"""
 
 
 NEVER: Final = Reached(math.inf, None)
@@ -69,4 +73,20 @@ def reached_by_noise(trials: Iterable[Trial], goal: float) -> Reached:
     last, trial = min(
         ((t.shots[-1], t) for t in known), key=lambda pair: pair[0].error ** 2 * pair[0].seconds
     )
-    return Reached(last.seconds * (last.error / goal) ** 2, trial, is_extrapolated=True)
+    return Reached(last.seconds * (last.error / goal) ** 2, trial, "~")
+
+
+def reached_or_later(trials: Iterable[Trial], goal: float) -> Reached:
+    """As `reached`; where no shot is within `goal`, the time of the last one that there was time for."""
+    known = [trial for trial in trials if trial.shots]
+    best = reached(known, goal)
+    if best.trial is not None or not known:
+        return best
+    return Reached(max(trial.shots[-1].seconds for trial in known), known[0], ">")
+
+
+def told(trials: list[Trial], goal: float) -> Reached:
+    """By the law that holds for what has made them: of noise alone, denoised, or by settings."""
+    if any(trial.renderer in NOISY for trial in trials):
+        return reached_by_noise(trials, goal)
+    return (reached_or_later if any(trial.is_peer for trial in trials) else reached)(trials, goal)

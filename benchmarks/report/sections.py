@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from benchmarks.plan import Job, Options, Section
-from benchmarks.report.front import GOALS, reached, reached_by_noise
+from benchmarks.report.front import GOALS, told
 from benchmarks.report.halls import FAMILIES
 from benchmarks.report.ours import TOLERANCES, measure_cold, measure_edited
 from benchmarks.report.peers import DENOISED, RAW, measure_peer
@@ -123,13 +123,13 @@ def _tabulate(found: list[Trials], title: str, case: Case) -> Table:
             *(f"to {percent(g, 0)}" for g in GOALS), "last frame", "its error", "peak MB",
         ),
         tuple(Row(_cells(trial)) for trial in trials if trial.case is case),
-        "Seconds of wall time. Last frame: the finished one, unless it says that time was up (…).",
+        "Seconds of wall time. Last frame: the finished one, unless time was up (…). ~: extrapolated by "
+        "1 / sqrt(samples). >: not reached by then. -: not reached.",
         names=3,
     )  # fmt: skip
 
 
 def _cells(trial: Trial) -> tuple[str, ...]:
-    times = reached_by_noise if trial.is_peer else reached
     first, last = trial.shots[0], trial.shots[-1]
     return (
         trial.scene,
@@ -137,7 +137,7 @@ def _cells(trial: Trial) -> tuple[str, ...]:
         trial.setting,
         seconds_text(first.seconds),
         percent(first.error, 1),
-        *(text_of(times([trial], goal)) for goal in GOALS),
+        *(text_of(told([trial], goal)) for goal in GOALS),
         seconds_text(last.seconds) + (" …" if trial.ending is Ending.TIME else ""),
         percent(last.error),
         memory_text(trial.peak_memory),

@@ -17,8 +17,8 @@ def seconds_text(seconds: float) -> str:
 
 
 def text_of(found: Reached) -> str:
-    """The time, ~ before one that is extrapolated, - for none."""
-    return f"{'~' if found.is_extrapolated else ''}{seconds_text(found.seconds)}"
+    """The time with its sign; - for none."""
+    return f"{found.sign}{seconds_text(found.seconds)}"
 
 
 def memory_text(megabytes: float) -> str:
@@ -31,4 +31,4 @@ def ratio_text(found: Reached, ours: Reached) -> str:
     if not math.isfinite(found.seconds) or not math.isfinite(ours.seconds):
         return "-"
     ratio = found.seconds / ours.seconds
-    return f"{'~' if found.is_extrapolated else ''}{ratio:.2g}" if ratio < 10 else f"{ratio:,.0f}"
+    return found.sign + (f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:,.0f}")

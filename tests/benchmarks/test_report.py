@@ -13,7 +13,7 @@ import pytest
 from benchmarks.machine import Machine
 from benchmarks.plan import SCENES, Options
 from benchmarks.report import document, ours, peers, profile, runs, scaling, sections, truth
-from benchmarks.report.front import front, reached, reached_by_noise
+from benchmarks.report.front import front, reached, reached_by_noise, told
 from benchmarks.report.halls import FAMILIES, icosphere
 from benchmarks.report.trials import Case, Ending, Shot, Trial, Trials
 from benchmarks.report.truth import Truth
@@ -50,10 +50,18 @@ def test_an_error_is_reached_by_the_first_frame_within_it() -> None:
 def test_noise_falls_by_the_root_of_the_samples() -> None:
     noisy = trial((1.0, 0.4), (4.0, 0.2), (16.0, 0.1))
     found = reached_by_noise([noisy], 0.01)
-    assert found.is_extrapolated
+    assert found.sign == "~"
     assert found.seconds == pytest.approx(1600.0)
     assert reached_by_noise([noisy], 0.2).seconds == 4.0
-    assert not reached_by_noise([noisy], 0.2).is_extrapolated
+    assert reached_by_noise([noisy], 0.2).sign == ""
+
+
+def test_what_is_denoised_is_not_extrapolated() -> None:
+    known = [trial((1.0, 0.4), (4.0, 0.2), renderer=peers.DENOISED, is_peer=True)]
+    assert told(known, 0.3).seconds == 4.0
+    assert (told(known, 0.01).seconds, told(known, 0.01).sign) == (4.0, ">")
+    assert told([trial((1.0, 0.1), renderer="path")], 0.01).sign == "~"
+    assert told([trial((1.0, 0.1))], 0.01).seconds == math.inf
 
 
 def test_the_noise_of_a_truth_is_not_in_an_error() -> None:
@@ -151,18 +159,18 @@ def cold() -> Trials:
 
 
 def test_frames_are_followed_from_a_scene_on(cold: Trials) -> None:
-    (told,) = cold.trials
-    assert told.ending is Ending.COMPLETE
-    times = [shot.seconds for shot in told.shots]
+    (found,) = cold.trials
+    assert found.ending is Ending.COMPLETE
+    times = [shot.seconds for shot in found.shots]
     assert times == sorted(times) and times[0] > 0.0
-    assert told.shots[-1].error < 0.5 * told.shots[0].error
-    assert told.peak_memory > 0.0
+    assert found.shots[-1].error < 0.5 * found.shots[0].error
+    assert found.peak_memory > 0.0
 
 
 def test_frames_are_followed_from_an_edit_on() -> None:
-    (told,) = ours.measure_edited("cornell", "gouraud", (0.3,), 5.0).trials
-    assert told.case is Case.EDITED and told.ending is Ending.COMPLETE
-    assert told.shots[-1].error < 0.5
+    (found,) = ours.measure_edited("cornell", "gouraud", (0.3,), 5.0).trials
+    assert found.case is Case.EDITED and found.ending is Ending.COMPLETE
+    assert found.shots[-1].error < 0.5
 
 
 def test_sizes_are_measured() -> None:
