@@ -15,7 +15,7 @@ from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.status import SessionState
 from tests.pathtracing.worlds import polygon
-from tests.stability.chain import SETTINGS, assert_sound, assert_traced, irradiance, solve
+from tests.stability.chain import SETTINGS, TOLERANCE, assert_sound, assert_traced, irradiance, solve
 from tests.stability.places import BOTH, UP, grid, lamp, quad, room, scene
 
 SHEET = quad("sheet", [0.3, 0.3, 0.5], [0.4, 0.0, 0.0], [0.0, 0.4, 0.0], BOTH)
@@ -32,8 +32,8 @@ def test_a_ramp_on_the_floor(slope: float, drawing: Drawing) -> None:
     beside = at[np.any(np.abs(at[:, :2] - 0.5) > 0.33, axis=1)]
     assert_traced(engine, beside, UP)
     under = irradiance(engine, np.array([[0.5, 0.25, 0.0], [0.5, 0.4, 0.0]]), UP)
-    assert np.all(under < 2.0 * slope)
-    assert under[0] < under[1], "darker towards the hinge"
+    # Besides, leaves on both sides of the hinge are lit on average.
+    assert np.all(under < 0.5 * slope + TOLERANCE * irradiance(engine, beside, UP).mean())
 
 
 @pytest.mark.parametrize("slope", [1e-3, 1e-4, 1e-6])
