@@ -50,9 +50,9 @@ class GrowingArray(Generic[T]):
         """Keep the first `count` rows."""
         self._size = min(self._size, count)
 
-    def trim(self) -> None:
-        """Give capacity back beyond what a few more rows will need."""
-        enough = self._size + self._size // 16
+    def trim(self, spare: float = 0.0625) -> None:
+        """Give capacity back beyond what a few more rows will need: `spare` of those that there are."""
+        enough = self._size + int(spare * self._size)
         if enough < len(self._data):
             kept: NDArray[T] = np.empty((enough, *self._data.shape[1:]), self._data.dtype)
             kept[: self._size] = self.live

@@ -220,11 +220,10 @@ class Redistribution(RadiositySolver):
     # --- the work, in slices -------------------------------------------------------------------------
 
     def _open(self) -> Iterator[bool]:
-        plan = self._plan or self._make_plan()
-        state = self._state
+        plan, state = self._plan or self._make_plan(), self._state
         # What has been shot is as uncertain as what has not, until it is propagated.
         self.error_estimate = min(1.0, math.hypot(self._known_error, SAFETY * plan.doubt))
-        yield True
+        # No pause here: every frame of a drag shows something of the light where it is now.
         at_stake = float(plan.left[0])
         for left, error in _EARLY:
             yield from self._pay(at_stake, left)

@@ -24,6 +24,10 @@ _POOLED: Final = 1 << 21
 _TRIM: Final = 1.0625
 """Entries of blocker lists that may be kept of those that are needed, when all else is given back"""
 
+_SPARE: Final = 0.25
+"""Room for more entries of blocker lists, of those that there are: to move them all takes long. It takes no
+memory until it is used."""
+
 _LEAST_POOL: Final = 1 << 16
 """Entries of blocker lists below which tidying is not worth it."""
 
@@ -264,9 +268,10 @@ class LinkTable:
         Yields every few milliseconds.
         """
         yield from self._tidy(_TRIM)
-        for name in (*_OWN, "pool"):
+        for name in _OWN:
             getattr(self, f"_{name}").trim()
             yield
+        self._pool.trim(_SPARE)
 
     def renumber(self, element: IntArray, patch: IntArray) -> None:
         """Elements and patches get the numbers `element` and `patch` of those that they had; none below 0."""
@@ -312,8 +317,8 @@ class LinkTable:
 
     def copy_in_steps(self) -> Generator[None, None, LinkTable]:
         """As `copy`; yields every few milliseconds. The table must not change meanwhile."""
-        other = LinkTable(len(self))
-        other._pool = GrowingArray((), np.int32, len(self._pool))
+        other = LinkTable(len(self) + len(self) // 16)
+        other._pool = GrowingArray((), np.int32, int((1.0 + _SPARE) * len(self._pool)))
         for name in _OWN:
             getattr(other, f"_{name}").append(getattr(self, name))
             yield
@@ -340,7 +345,7 @@ class LinkTable:
         if len(self._pool) <= max(slack * needed, (slack - 1.0) * _LEAST_POOL):
             return
         start = np.cumsum(count, dtype=np.int64) - count
-        pool = GrowingArray((), np.int32, int((0.5 + 0.5 * slack) * needed) + needed // 16)
+        pool = GrowingArray((), np.int32, int((0.5 + 0.5 * slack + _SPARE) * needed))
         at = 0
         while at < len(count):
             stop = max(at + 1, int(np.searchsorted(start, start[at] + _POOLED, side="right")))
