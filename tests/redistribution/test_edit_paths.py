@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from solver.geometry.scene import Scene
 from solver.redistribution.redistribution import Redistribution
 from solver.transport.field import SolveOutcome
+from solver.transport.links import take_ranges
 from solver.transport.settings import SolverSettings
 from solver.transport.solve import RadiositySolver
 from tests.pathtracing.worlds import material
@@ -106,7 +107,8 @@ class Edits(RuleBasedStateMachine):
         links = self.solver.state.links
         for name in ("p", "q"):
             assert getattr(links, name).max(initial=-1) < len(self.solver.state.tree)
-        assert links.pool.min(initial=0) >= 0
+        lists = take_ranges(links.pool, links.blocker_start, links.blocker_count)
+        assert lists.min(initial=0) >= 0
         assert not links.debt.any()
 
     def teardown(self) -> None:
