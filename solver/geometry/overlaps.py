@@ -23,6 +23,9 @@ _KEY: Final[FloatArray] = np.array([0.755, 0.570, 0.430, 0.819, 0.671, 0.549, 0.
 _WINDOW: Final = 1e-4
 """Planes whose keys differ by more are different."""
 
+_SWEEP: Final[FloatArray] = np.array([0.61, 0.53, 0.59])
+"""Direction in which faces are swept over: along no wall, so that the tiles of any are met one by one."""
+
 
 def find_covers(
     corners: Corners, counts: IntArray, normals: FloatArray, two_sided: BoolArray, center: Vector, size: float
@@ -36,12 +39,20 @@ def find_covers(
     x, y, z = normals.T
     told = [x * x, y * y, z * z, x * y, y * z, z * x, offset * x, offset * y, offset * z]
     key = np.sum(_KEY[:, None] * np.stack(told), axis=0)
-    order = np.argsort(key, kind="stable")
     low, high = local.min(axis=1), local.max(axis=1)
+    along = local @ _SWEEP
+    start, stop = along.min(axis=1), along.max(axis=1)
     gap, margin = tolerances.RAY_OFFSET * size, tolerances.TOUCH * size
-    found = _find(
-        order, key, low, high, local, counts, normals, two_sided, gap, tolerances.SIDE * size, margin
-    )
+    # Planes that agree share a slot of the one kind or the other; within slots, faces are swept over.
+    slots = [np.floor(0.5 * key / _WINDOW + shift).astype(np.int64) for shift in (0.0, 0.5)]
+    pairs = [
+        _find(
+            np.lexsort((start, slot)), slot, known, start, stop, low, high, local, counts, normals, two_sided,
+            gap, tolerances.SIDE * size, margin,
+        )
+        for slot, known in ((slots[0], np.arange(len(key))), (slots[1], slots[0]))
+    ]  # fmt: skip
+    found = np.concatenate(pairs)
     found = found[np.lexsort((found[:, 1], found[:, 0]))]
     return found[:, 0], found[:, 1]
 
@@ -71,7 +82,10 @@ def cut_covered(
 @kernel
 def _find(
     order: Int64Array,
-    key: FloatArray,
+    slot: Int64Array,
+    known: Int64Array,
+    start: FloatArray,
+    stop: FloatArray,
     low: FloatArray,
     high: FloatArray,
     corners: Corners,
@@ -82,15 +96,23 @@ def _find(
     tie: float,
     margin: float,
 ) -> IntArray:
-    """Pairs (m, 2) of the face that is covered and the one that covers it."""
+    """Pairs (m, 2) of the face that is covered and the one that covers it.
+
+    Of faces of one `slot` (p,), in `order` of these and of where they `start` along the sweep; but not of
+    those that are `known` (p,) alike, which have been looked at.
+    """
     found = np.empty((16, 2), dtype=np.int32)
     made = 0
-    for start in range(len(order)):
-        for at in range(start + 1, len(order)):
-            a = min(order[start], order[at])
-            b = max(order[start], order[at])
-            if key[order[at]] - key[order[start]] > _WINDOW:
+    for first in range(len(order)):
+        one = order[first]
+        for at in range(first + 1, len(order)):
+            other = order[at]
+            if slot[other] != slot[one] or start[other] > stop[one] + gap:
                 break
+            if known[other] == known[one]:
+                continue
+            a = min(one, other)
+            b = max(one, other)
             apart = False
             for axis in range(3):
                 if low[a, axis] > high[b, axis] + gap or low[b, axis] > high[a, axis] + gap:

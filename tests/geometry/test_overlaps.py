@@ -128,3 +128,17 @@ def turns(surfaces: Surfaces) -> FloatArray:
     edge = np.roll(surfaces.corners, -1, axis=1) - surfaces.corners
     turn = np.cross(edge, np.roll(edge, -1, axis=1))
     return np.asarray(np.einsum("pki,pi->pk", turn, surfaces.normal))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_walls_of_many_tiles_are_left_alone(axis: int) -> None:
+    """14,400 in one plane, which would be 10^8 pairs."""
+    n = 120
+    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
+    vertices = np.insert(np.stack([x.ravel(), y.ravel()], axis=1), axis, 0.0, axis=1)
+    corner = np.arange(n)[:, None] * (n + 1) + np.arange(n)
+    faces = np.stack([corner, corner + n + 1, corner + n + 2, corner + 1], axis=-1).reshape(-1, 4)
+    mesh = Mesh(vertices, tuple(tuple(face) for face in faces.tolist()))
+    surfaces = flat(SceneObject("tiles", mesh, material(0.5)), sheet("far", 1.0))
+    assert surfaces.patch_count == n * n + 1
+    assert not surfaces.warnings
