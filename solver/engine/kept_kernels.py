@@ -20,8 +20,13 @@ def load_kept_kernels() -> tuple[str, ...]:
     Returns the names of those of which nothing is kept: they have not been compiled since their source
     changed, or are never called.
     """
-    entered = {id(kernel): kernel for module in _modules() for kernel in _entered(module)}.values()
-    return tuple(sorted(f"{kernel.__module__}.{kernel.__name__}" for kernel in entered if not _load(kernel)))
+    missing = [kernel for kernel in entered_kernels() if not _load(kernel)]
+    return tuple(sorted(f"{kernel.__module__}.{kernel.__name__}" for kernel in missing))
+
+
+def entered_kernels() -> list[Any]:
+    """The kernels that modules of the solver may enter from Python, as far as those have been imported."""
+    return list({id(kernel): kernel for module in _modules() for kernel in _entered(module)}.values())
 
 
 def _modules() -> list[ModuleType]:

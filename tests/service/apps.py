@@ -8,6 +8,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import httpx
@@ -18,6 +19,7 @@ from service.app import create_app
 from service.config import ServiceSettings
 from service.hosting.nursery import Nursery
 from service.server import Server
+from tests.engine.scenes import box_document
 from tests.service.processes import PATIENCE
 
 NURSERY = Nursery()
@@ -30,6 +32,19 @@ def _app(settings: dict[str, Any]) -> FastAPI:
 def app_client(**settings: Any) -> TestClient:
     """The client of a new app; as a context, it begins and ends the app's life."""
     return TestClient(_app(settings))
+
+
+@dataclass(frozen=True)
+class Served:
+    """A service, and a client of it."""
+
+    http: httpx.Client
+
+    def open(self, settings: dict[str, Any]) -> str:
+        """The path of a new session on the box."""
+        answer = self.http.post("/v1/sessions", json={"scene": box_document(), "settings": settings})
+        assert answer.status_code == 201, answer.text
+        return str(answer.headers["location"])
 
 
 @contextmanager

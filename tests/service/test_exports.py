@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.conftest import LOOSE
 from tests.service.problem import fields_at_fault, problem_of
 
 
@@ -34,25 +33,28 @@ def test_every_file(client: TestClient, settled: str, chosen: str, media: str, m
 
 
 def test_what_is_exported_opens_an_equal_session(client: TestClient, settled: str) -> None:
+    fine = {"error_tolerance": 0.01}
     before = client.get(f"{settled}/scene").json()["scene"]
+    twin = client.post("/v1/sessions", json={"scene": before, "settings": fine}).headers["location"]
     for shading in ("light", "materials"):
         content = client.get(f"{settled}/export", params={"shading": shading}).content
         answer = client.post(
             "/v1/sessions",
             content=content,
             headers={"Content-Type": "model/gltf-binary"},
-            params={"settings": json.dumps(LOOSE)},
+            params={"settings": json.dumps(fine)},
         )
         path = answer.headers["location"]
         after = client.get(f"{path}/scene").json()["scene"]
         assert [o["id"] for o in after["objects"]] == [o["id"] for o in before["objects"]]
         assert [o["material"] for o in after["objects"]] == [o["material"] for o in before["objects"]]
         frames = []
-        for place in (settled, path):
+        for place in (twin, path):
             query = {"wait": "converged", "format": "npy", "renderer": "gouraud"}
             frames.append(np.load(io.BytesIO(client.get(f"{place}/frame", params=query).content)))
         assert np.abs(frames[0] - frames[1]).mean() < 0.02 * frames[0].mean()
         assert client.delete(path).status_code == 204
+    assert client.delete(twin).status_code == 204
 
 
 def test_arrays_hold_the_solution(client: TestClient, settled: str) -> None:

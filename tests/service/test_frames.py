@@ -85,7 +85,8 @@ def test_headers_tell_what_a_frame_is_worth(client: TestClient, settled: str) ->
     assert headers["x-revision"] == "1"
     assert headers["x-converged"] == "true"
     assert headers["x-renderer"] == "interpolant"
-    assert float(coarse["x-error-estimate"]) == pytest.approx(status["error_estimate"], rel=1e-4)
+    # Elements show less than the solution knows.
+    assert float(coarse["x-error-estimate"]) >= 0.999 * status["error_estimate"]
     assert 0.0 < float(headers["x-error-estimate"]) < status["settings"]["error_tolerance"]
     assert float(headers["x-render-ms"]) > 0.0
     assert headers["cache-control"] == "no-cache"

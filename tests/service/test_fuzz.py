@@ -52,7 +52,7 @@ OPERATIONS: Final = [
 ]
 
 QUICK: Final = settings(
-    max_examples=30, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=15, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
 )
 
 _LONGEST: Final = 10_000

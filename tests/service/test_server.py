@@ -18,7 +18,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.engine.scenes import box_document
+from tests.service.apps import Served
 from tests.service.problem import problem_of
 from tests.service.processes import PATIENCE, children_of, eventually, is_running
 
@@ -27,11 +27,10 @@ ENDLESS = {"error_tolerance": 1e-6, "max_elements": 2_000_000}
 
 
 @dataclass(frozen=True)
-class Service:
-    """A running service."""
+class Service(Served):
+    """A service in a process of its own."""
 
     process: subprocess.Popen[str]
-    http: httpx.Client
 
     def workers(self) -> set[int]:
         """Process ids of its workers."""
@@ -40,12 +39,6 @@ class Service:
     def nurseries(self) -> set[int]:
         """Process ids of what its workers are forked from: one, or none."""
         return children_of(self.process.pid)
-
-    def open(self, settings: dict[str, Any]) -> str:
-        """The path of a new session on the box."""
-        answer = self.http.post("/v1/sessions", json={"scene": box_document(), "settings": settings})
-        assert answer.status_code == 201, answer.text
-        return str(answer.headers["location"])
 
 
 @contextmanager
@@ -63,7 +56,7 @@ def running(**environment: str) -> Iterator[Service]:
         address = re.search(r"http://127\.0\.0\.1:\d+", told)
         assert address is not None, f"told {told!r}, and {process.communicate()[1]}"
         with httpx.Client(base_url=address[0], timeout=PATIENCE) as http:
-            yield Service(process, http)
+            yield Service(http, process)
     finally:
         process.kill()
         process.communicate()
@@ -211,7 +204,7 @@ def test_workers_end_when_the_service_is_killed() -> None:
         assert eventually(lambda: not any(map(is_running, workers)))
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_it_ends_at_a_signal_without_a_word(number: signal.Signals) -> None:
     with running() as service:
         path = service.open(ENDLESS)

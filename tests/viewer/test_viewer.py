@@ -13,7 +13,8 @@ import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
 
 from tests.engine.scenes import box_document
-from tests.service.test_server import Service, running
+from tests.service.apps import Served, serving
+from tests.service.test_server import running
 from tests.viewer.browser import ARTEFACTS, PATIENCE, Viewer, chromium, viewing
 
 
@@ -27,13 +28,13 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def service() -> Iterator[Service]:
-    with running() as service:
-        yield service
+def service() -> Iterator[Served]:
+    with serving(pool_size=1) as http:
+        yield Served(http)
 
 
 @pytest.fixture
-def viewer(browser: Browser, service: Service) -> Iterator[Viewer]:
+def viewer(browser: Browser, service: Served) -> Iterator[Viewer]:
     with viewing(browser, f"{service.http.base_url}/") as viewer:
         yield viewer
 
@@ -46,12 +47,12 @@ def session_of(viewer: Viewer) -> str:
     return f"/v1/sessions/{found[1]}"
 
 
-def scene_of(service: Service, path: str) -> dict[str, Any]:
+def scene_of(service: Served, path: str) -> dict[str, Any]:
     objects = service.http.get(f"{path}/scene").json()["scene"]["objects"]
     return {found["id"]: found for found in objects}
 
 
-def test_it_shows_a_scene_that_converges_and_follows_the_pointer(viewer: Viewer, service: Service) -> None:
+def test_it_shows_a_scene_that_converges_and_follows_the_pointer(viewer: Viewer, service: Served) -> None:
     viewer.open()
     viewer.settle()
     page = viewer.page
@@ -81,7 +82,7 @@ def test_it_shows_a_scene_that_converges_and_follows_the_pointer(viewer: Viewer,
     assert page.url == shared
 
 
-def test_what_is_clicked_can_be_moved_painted_undone_and_deleted(viewer: Viewer, service: Service) -> None:
+def test_what_is_clicked_can_be_moved_painted_undone_and_deleted(viewer: Viewer, service: Served) -> None:
     viewer.open()
     viewer.settle()
     page, path = viewer.page, session_of(viewer)
@@ -177,7 +178,7 @@ def test_a_file_is_opened_and_bad_ones_say_what_is_wrong(viewer: Viewer, tmp_pat
 
 
 @pytest.mark.slow
-def test_it_reads_well_on_a_phone_and_in_the_dark(browser: Browser, service: Service) -> None:
+def test_it_reads_well_on_a_phone_and_in_the_dark(browser: Browser, service: Served) -> None:
     with viewing(browser, f"{service.http.base_url}/", (390, 844), "dark") as viewer:
         viewer.open()
         viewer.settle()
@@ -223,7 +224,7 @@ def test_keys_reach_everything(viewer: Viewer) -> None:
 
 
 @pytest.mark.slow
-def test_a_session_that_is_gone_is_told_and_opened_anew(browser: Browser, service: Service) -> None:
+def test_a_session_that_is_gone_is_told_and_opened_anew(browser: Browser, service: Served) -> None:
     with viewing(browser, f"{service.http.base_url}/", may_be_lost=True) as viewer:
         viewer.open()
         path, page = session_of(viewer), viewer.page
