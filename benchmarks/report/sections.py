@@ -130,6 +130,10 @@ def _tabulate(found: list[Trials], title: str, case: Case) -> Table:
 
 
 def _cells(trial: Trial) -> tuple[str, ...]:
+    if not trial.shots:
+        # Such a renderer has nothing to show until it is done.
+        shown = ("-",) * (len(GOALS) + 2)
+        return trial.scene, trial.renderer, trial.setting, *shown, "…", "-", memory_text(trial.peak_memory)
     first, last = trial.shots[0], trial.shots[-1]
     return (
         trial.scene,

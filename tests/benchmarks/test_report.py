@@ -227,6 +227,16 @@ def test_the_report_is_whole_and_reads_back(cold: Trials, tmp_path: Path) -> Non
     assert runs.trials_of(runs.load(file)) == [*cold.trials, *rival.trials]
 
 
+def test_a_trial_without_a_frame_has_a_row() -> None:
+    """Where time is up before there is anything to show."""
+    nothing = trial(renderer="gather", ending=Ending.TIME)
+    table = sections.tabulate_cold([Trials((nothing,))])
+    assert_whole(table, 1, "scene", "first frame", "last frame")
+    assert "…" in table.rows[0].cells
+    assert reached([nothing], 0.5).trial is None
+    assert told([trial(renderer="path")], 0.5).trial is None
+
+
 def test_the_quick_form_is_smaller_than_the_full_one() -> None:
     quick, full = Options(SCENES[:3], True), Options(SCENES, False)
     for section in (sections.cold, sections.edited, sections.peers, sections.scaling):
