@@ -30,8 +30,11 @@ DENOISED: Final = "Mitsuba path + OIDN"
 
 _PACKAGES: Final = ("mitsuba", "pyoidn")
 _VARIANT: Final = "llvm_ad_rgb"
-_PASSES: Final = (64, 16, 8, 4, 2, 1)
+_PASSES: Final = (1, 2, 4, 8, 16, 64)
 """Samples of a pixel that are stratified together: the most that fit are taken"""
+
+_REHEARSED: Final = 0.4
+"""Share of the limit after which no larger passes are compiled, nor made"""
 
 
 def missing_peers() -> str:
@@ -71,8 +74,12 @@ def measure_peer(scene: str, is_denoised: bool, limit: float) -> Trials:
     denoise = _denoiser() if is_denoised else _as_it_is
     rehearsed = mitsuba_scene(World.of(loaded), camera, is_denoised)
     # Each number of samples has kernels of its own.
+    start, passes = time.perf_counter(), list[int]()
     for samples in _PASSES:
         denoise(np.array(mi.render(rehearsed, spp=samples)))
+        passes.insert(0, samples)
+        if time.perf_counter() - start > _REHEARSED * limit:
+            break
 
     reset_peak_memory()
     start = time.perf_counter()
@@ -84,7 +91,7 @@ def measure_peer(scene: str, is_denoised: bool, limit: float) -> Trials:
         wanted = max(1, 2 * samples)
         start = time.perf_counter()
         while samples < wanted:
-            now = next(size for size in _PASSES if size <= wanted - samples)
+            now = next(size for size in passes if size <= wanted - samples)
             total += now * np.array(mi.render(shown, spp=now, seed=samples), dtype=np.float64)
             samples += now
         image = (total / samples).astype(np.float32)

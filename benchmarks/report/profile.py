@@ -97,7 +97,11 @@ def _reached(engine: Engine) -> int:
 
 def section(options: Options) -> Section:
     """The small scenes."""
-    jobs = tuple(Job(name, measure_profile, (name,)) for name in options.scenes if name in _SCENES)
+    jobs = tuple(
+        Job(name, measure_profile, (name,))
+        for name in options.scenes
+        if name in _SCENES[: 1 if options.quick else None]
+    )
     return Section("profile", jobs, tabulate)
 
 

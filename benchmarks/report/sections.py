@@ -28,7 +28,7 @@ QUICK_SCENES: Final = ("cornell", "office")
 _SOLVED: Final = (RendererName.INTERPOLANT, RendererName.GOURAUD)
 _QUICK_TOLERANCES: Final = (0.08, 0.04, 0.02)
 _QUICK_RENDERERS: Final = (*_SOLVED, RendererName.VPL)
-_QUICK_SIZES: Final = 1_500
+_QUICK_SIZES: Final = 700
 """Polygons, at most"""
 
 _SAMPLED_SHARE: Final = 0.5
@@ -56,7 +56,7 @@ def edited(options: Options) -> Section:
     for scene in _scenes(options):
         for renderer in (RendererName.INTERPOLANT, RendererName.GOURAUD, RendererName.VPL):
             chosen = _QUICK_TOLERANCES[1:] if options.quick else TOLERANCES[1:]
-            if options.quick and renderer is RendererName.VPL:
+            if options.quick and renderer != RendererName.INTERPOLANT:
                 continue
             arguments = (scene, renderer.value, chosen, _limit_of(renderer, options))
             jobs.append(Job(f"{scene}, {renderer}", measure_edited, arguments))
