@@ -59,8 +59,8 @@ class Spared:
 
     saving: str
     spared: int
-    """Of whatever it leaves out: channels, links without rays, rays, discontinuities, triangles; links that are
-    not subdivided"""
+    """Of whatever it leaves out: channels, links without rays, rays, discontinuities, triangles; links that
+    are not subdivided"""
     of: int
     """Of how many"""
     error_estimate: float

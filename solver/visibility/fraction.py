@@ -189,8 +189,8 @@ def visible_fractions(
         ) -> None:
             generate_rays(
                 p, q, samples, corners, counts, area, patch, normals, axes, centroid, key, rays.center,
-                rays.scale, rays.offset, first, first + start, first + stop, origins, directions, weights, strata,
-                places,
+                rays.scale, rays.offset, first, first + start, first + stop, origins, directions, weights,
+                strata, places,
             )  # fmt: skip
 
         run_chunks(generate, last - first, _CHUNK, max(1, _LEAST // samples))

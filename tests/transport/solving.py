@@ -75,11 +75,10 @@ def furnace(reflectance: float, emission: float = 1.0, shift: float = 0.0) -> Wo
 
     Rays depend on where elements are: that is another draw of them.
     """
-    low, high = np.array([0.3, 0.25, 0.35]), np.array([0.6, 0.7, 0.65])
-    x = np.array([shift, 0.0, 0.0])
+    low, high = (0.3 + shift, 0.25, 0.35), (0.6 + shift, 0.7, 0.65)
     return world(
-        box("room", reflectance, emission, x, x + 1.0),
-        box("block", reflectance, emission, low + x, high + x, inward=False),
+        box("room", reflectance, emission, (shift, 0.0, 0.0), (1.0 + shift, 1.0, 1.0)),
+        box("block", reflectance, emission, low, high, inward=False),
     )
 
 
