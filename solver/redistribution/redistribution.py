@@ -336,6 +336,8 @@ class Redistribution(RadiositySolver):
         if full:
             self.lean = len(state.links)
         yield from self._refine_new(_CLOSER * self.bound)
+        # From here on elements are divided and light is settled as in any solve.
+        self._moments = None
         yield from self._refine_beyond()
         gone = unneeded(state.tree, state.links)
         if gone.sum() > _FOLDED * len(gone):
