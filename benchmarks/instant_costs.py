@@ -7,6 +7,7 @@ its lamps: one, or the 248 of [K fig. 12], of the same area in all. The frame ha
 from __future__ import annotations
 
 import time
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -85,11 +86,18 @@ class _Timed(LightBlocks):
         self.walked = self.looked = self.lit = 0.0
         self.pixels: list[Receivers] = []
 
-    def block(self, number: int) -> LightBlock:
-        start = time.perf_counter()
-        found = super().block(number)
-        self.walked += time.perf_counter() - start
-        return found
+    def block_in_steps(self, number: int) -> Generator[None, None, LightBlock]:
+        work = super().block_in_steps(number)
+        while True:
+            start = time.perf_counter()
+            try:
+                next(work)
+            except StopIteration as end:
+                found: LightBlock = end.value
+                return found
+            finally:
+                self.walked += time.perf_counter() - start
+            yield
 
     def sights(self, block: LightBlock, batch: int) -> Sights:
         start = time.perf_counter()

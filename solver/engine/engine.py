@@ -463,7 +463,7 @@ class Engine:
         owed = solver.owed() if isinstance(solver, Redistribution) else {}
         return Progress(
             owed=owed,
-            unshot=solver.unshot_power() if isinstance(solver, RadiositySolver) and not owed else 0.0,
+            unshot=solver.unshot_power() if isinstance(solver, RadiositySolver) else 0.0,
             shots=shots,
             is_settled=False,
         )

@@ -129,7 +129,8 @@ def test_edits_are_measured(tmp_path: Path) -> None:
         for curve in one.curves:
             first, last = curve.samples[0], curve.samples[-1]
             assert last.to_come == EditError(0.0, 0.0)
-            assert last.error.where_most < first.error.where_most
+            # An edit that changes less than the solution errs by is not told from it.
+            assert last.error.where_most < max(first.error.where_most, SMALL.tolerance)
             assert 0.0 < first.work.cpu < last.work.cpu
         shot = one.curves[-1].samples
         assert shot[0].error == EditError(1.0, 1.0), "nothing is lit"
