@@ -122,7 +122,7 @@ def test_dev_lock_holds_the_run_lock() -> None:
 
 def test_dockerfile_installs_by_the_set_up_script_alone() -> None:
     commands = [c.strip() for i in instructions() if i.name == "RUN" for c in i.arguments.split("&&")]
-    allowed = {SET_UP, "useradd", "chown", "rm"}
+    allowed = {SET_UP, "useradd", "mkdir", "chown", "rm"}
     assert {shlex.split(command)[0] for command in commands} <= allowed
     parts = [c.removeprefix(SET_UP).strip() for c in commands if c.startswith(SET_UP)]
     assert parts == ["--system-only", "--python-only"], "together, in this order, they are the whole set-up"
