@@ -24,6 +24,9 @@ DETAILS: Final = (
     "instant", "lights", "walkthrough", "edits", "drags", "service",
 )  # fmt: skip
 _GROUPS: Final = {"report": REPORT, "details": DETAILS, "all": REPORT + DETAILS}
+_FULL_ALONE: Final = ("calibration", "savings")
+"""Not in the quick form unless they are named: it is to take three minutes"""
+
 _QUICK_LEAVES_OUT: Final = "robot_cell"
 _OUT: Final = Path("out") / "report"
 
@@ -72,6 +75,8 @@ def bench(
     options = Options(_named(scenes, SCENES, "--scenes") if scenes else every, not full)
     named = _named(only, (*_GROUPS, *_GROUPS["all"]), "--only")
     chosen = {name for given in named for name in _GROUPS.get(given, (given,))}
+    if not full:
+        chosen -= set(_FULL_ALONE) - set(named)
     plan = [section for section in _sections(options) if section.name in chosen and section.jobs]
     if file is not None and not file.parent.is_dir():
         raise typer.BadParameter(f"there is no directory {file.parent}", param_hint="--json")

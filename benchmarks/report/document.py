@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Final
 
 from benchmarks.calibration import section as calibration
+from benchmarks.plan import SCENES
 from benchmarks.report import profile
 from benchmarks.report.front import GOALS, NEVER, Reached, chosen, reached, told
 from benchmarks.report.peers import DENOISED, RAW
@@ -34,6 +36,8 @@ _RATIOS: Final = {
 _RENDERPARK: Final = {0.02: 0.4, 0.01: 2.3}
 """Processor seconds of RenderPark's Galerkin radiosity for the Cornell box at 640x480 to an error, as they
 were given to the project for a machine of two cores; not measured here"""
+
+_LOAD: Final = re.compile(r", load ([\d.]+) before")
 
 _INTRODUCTION: Final = """\
 # Speed against error
@@ -131,16 +135,26 @@ def _renderpark(trials: list[Trial]) -> Table:
 
 
 def _head(runs: dict[str, Run]) -> str:
-    ran = sorted({(run.machine, run.peers) for run in runs.values()})
+    ran = sorted({(_LOAD.sub("", run.machine), run.peers) for run in runs.values()})
     machines = "\n".join(f"- {machine}{'; ' + peers if peers else ''}" for machine, peers in ran)
     measured = Table(
         "What was measured when",
-        ("section", "form", "commit", "day", "seconds"),
+        ("section", "form", "commit", "day", "load before", "seconds"),
         tuple(
-            Row((name, "quick" if run.is_quick else "full", run.commit, run.day, f"{run.seconds:.0f}"))
+            Row(
+                (
+                    name,
+                    "quick" if run.is_quick else "full",
+                    run.commit,
+                    run.day,
+                    " ".join(_LOAD.findall(run.machine)),
+                    f"{run.seconds:.0f}",
+                )
+            )
             for name, run in runs.items()
         ),
-        "+ behind a commit: with changes that were not committed.",
+        "+ behind a commit: with changes that were not committed. Several commits: measured in pieces. Load: "
+        "processes that ran on the machine besides, in the mean over a minute; two or more slow everything.",
         names=4,
     )
     return "\n".join([_INTRODUCTION, machines, "", measured.markdown()])
@@ -154,6 +168,9 @@ def _ratios(runs: dict[str, Run], trials: list[Trial]) -> str:
 
 def _times(trials: list[Trial]) -> str:
     parts = ["## Time to an error", ""]
+    left_out = [scene for scene in SCENES if scene not in {trial.scene for trial in trials}]
+    if left_out:
+        parts += [f"Not measured this time: {', '.join(left_out)}.", ""]
     for case in Case:
         rows = []
         for scene in dict.fromkeys(trial.scene for trial in trials):
