@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import mmap
 import re
 import resource
@@ -38,6 +40,9 @@ class MemoryLimit:
         if now < self._due:
             return False
         self._due = now + _INTERVAL
+        if _resident() <= self._most:
+            return False
+        _give_back()
         return _resident() > self._most
 
     @property
@@ -48,6 +53,14 @@ class MemoryLimit:
             "paused. An edit or a change of settings lets it go on: fewer elements, or a larger "
             "error_tolerance, take less."
         )
+
+
+def _give_back() -> None:
+    """Let go of what nobody uses any more, and of what the C library keeps for later."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def _resident() -> int:

@@ -7,6 +7,7 @@ whatever is asked next sees the new geometry, with the light that is still valid
 
 from __future__ import annotations
 
+import gc
 import secrets
 import time
 from collections.abc import Sequence
@@ -115,6 +116,8 @@ class Engine:
         self._is_behind = False
         """Whether the solution is that of an earlier world"""
         self._halted: str | None = None
+        self._is_outgrown = False
+        """Whether what the solution was halted for is still held by it"""
         """What to tell where no work is done until the next change"""
         self._power: dict[ObjectId, float] = {}
         """W of luminance that left each object before the last transition that goes on with no drag"""
@@ -171,13 +174,17 @@ class Engine:
         if settings == self._settings:
             return
         # What is too large to be gone on from would be so again.
-        earlier = self._solution if self._halted is None else None
+        earlier = None if self._is_outgrown else self._solution
         before, self._settings, self._halted = self._settings, settings, None
         if settings.solves_as(before):
             self._fine, self._gathers, self._instant = None, None, None
             self._turn += 1
         else:
             self._settle(World.of(self.scene, self._world, _in_colour(settings)), earlier, False)
+            if self._is_outgrown:
+                # Solutions are in cycles with their work, and would be held on to for a while.
+                gc.collect()
+                self._is_outgrown = False
 
     def step(self, budget: float) -> bool:
         """Work for about `budget` seconds; False if nothing needed any.
@@ -203,7 +210,7 @@ class Engine:
 
         The status tells `reason` as a warning; what was solving is paused.
         """
-        self._halted = reason
+        self._halted, self._is_outgrown = reason, True
         self._memory = Memory()
 
     def build_everything(self) -> None:
