@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -84,20 +83,3 @@ class AutoView:
     def draw(self) -> AnyArray:
         """The picture of the view that is shown. Raises RenderingUnavailableError."""
         return self.chosen[1].draw()
-
-
-class FrameTimes:
-    """What frames have cost whoever serves them, encoding included, for those with a deadline."""
-
-    def __init__(self) -> None:
-        self._seconds = math.nan
-
-    def learn(self, seconds: float) -> None:
-        """Take in a frame; the latest ones count most."""
-        before = seconds if math.isnan(self._seconds) else self._seconds
-        self._seconds = max(seconds, 0.5 * (before + seconds))
-
-    @property
-    def expected(self) -> float:
-        """Seconds that the next one will cost; 0 while nothing is known."""
-        return 0.0 if math.isnan(self._seconds) else self._seconds

@@ -18,12 +18,13 @@ import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
-from solver.engine.auto import AutoView, FrameTimes, renderers_for
+from solver.engine.auto import AutoView, renderers_for
 from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.checkpoint import Checkpoint
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.exports.files import Export, ExportRequest, encode_export
 from solver.engine.fine import FineLight
+from solver.engine.frame_times import FrameTimes
 from solver.engine.gathers import GatherFrames
 from solver.engine.grids import Grid, GridRequest, grid_of
 from solver.engine.history import Step, step_of

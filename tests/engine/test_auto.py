@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from solver.engine import auto
-from solver.engine.auto import AutoView, FrameTimes
+from solver.engine.auto import AutoView
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
+from solver.engine.frame_times import FrameTimes
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName, Wait, WaitFor
 from solver.geometry.scene import Scene
 from solver.illumination.settings import LightSettings
