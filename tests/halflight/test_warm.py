@@ -14,6 +14,14 @@ import pytest
 from solver.engine.kept_kernels import load_kept_kernels
 from tests.halflight.commands import ROOT, invoke, run
 
+UNUSED_BY_SESSIONS = {
+    "solver.illumination.particles.path_numbers._fill_random",
+    "solver.illumination.particles.path_numbers._jitter",
+    "solver.illumination.particles.radical_inverse.radical_inverse",
+    "solver.rendering.interpolant_pass._join_corners",
+}
+"""Kept only where something else has called them: what there is to compare with, and linear interpolants."""
+
 SESSION = """
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
@@ -133,7 +141,7 @@ def test_warm_says_when_it_is_done_and_all_can_be_loaded_at_one_go() -> None:
     result = invoke("warm")
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout.startswith("kernels are compiled")
-    assert load_kept_kernels() == ()
+    assert set(load_kept_kernels()) <= UNUSED_BY_SESSIONS
 
 
 @pytest.mark.slow
