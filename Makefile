@@ -3,6 +3,8 @@
 SHELL := /bin/bash
 PYTHON := .venv/bin/python
 PYTEST_ARGS ?=
+# A file's tests stay together, since they share what they set up. PYTEST_ARGS="-n 0" runs all in one process.
+PYTEST = $(PYTHON) -m pytest --numprocesses logical --dist loadfile
 BENCH_ARGS ?=
 # PIP_COMPILE_ARGS=--upgrade moves every package to its newest release.
 PIP_COMPILE_ARGS ?=
@@ -24,10 +26,10 @@ serve: setup ## serve on 127.0.0.1:8000, or on HOST and PORT; sessions are kept 
 	@exec .venv/bin/halflight serve
 
 test: setup-dev ## run the tests, but for the slow ones (PYTEST_ARGS="-k name")
-	$(PYTHON) -m pytest $(PYTEST_ARGS)
+	$(PYTEST) $(PYTEST_ARGS)
 
 test-all: setup-dev ## run all tests
-	$(PYTHON) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
+	$(PYTEST) -m "slow or not slow" $(PYTEST_ARGS)
 
 bench: setup ## report speed against error into out/report (BENCH_ARGS="--full", "--help")
 	@$(PYTHON) -m benchmarks $(BENCH_ARGS)
