@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import re
 import signal
 import statistics
 import subprocess
@@ -28,6 +27,7 @@ from typing import Annotated, Any, Final, TypeVar
 import httpx
 import typer
 
+from benchmarks.load_memory import Memory, memory_table, workers_of
 from benchmarks.served import served
 
 T = TypeVar("T")
@@ -35,28 +35,8 @@ T = TypeVar("T")
 _SCENES: Final = ("cornell", "cube_room")
 _SIZE: Final[dict[str, str | int]] = {"width": 320, "height": 240, "format": "jpeg"}
 _PATIENCE: Final = 120.0
-_TOLD: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Parts of the time after which memory is told"""
-
 _WEIGHED: Final = 5.0
 """Seconds between two looks at memory: each takes the system milliseconds a process."""
-
-
-@dataclass(frozen=True)
-class Memory:
-    """MB of a service, what processes share counted once."""
-
-    web: float
-    """Of the process that serves"""
-    workers: int
-    all: float
-
-    @staticmethod
-    def of(service: int) -> Memory:
-        """As it is now."""
-        workers = _workers(service)
-        web = _shared_out(service)
-        return Memory(web, len(workers), web + sum(map(_shared_out, (*_children(service), *workers))))
 
 
 @dataclass
@@ -80,10 +60,7 @@ class Tally:
         failed = ", ".join(f"{count} {what}" for what, count in self.failures.items()) or "none"
         lines.append(f"failures: {failed}; workers killed: {self.kills}")
         if self.memory:
-            told = [self.memory[round(part * (len(self.memory) - 1))] for part in _TOLD]
-            lines.append("MB of all: " + ", ".join(f"{found.all:.0f}" for found in told))
-            lines.append("MB of the process that serves: " + ", ".join(f"{found.web:.0f}" for found in told))
-            lines.append("workers: " + ", ".join(str(found.workers) for found in told))
+            lines.append(memory_table(self.memory))
         return "\n".join(lines)
 
 
@@ -212,36 +189,16 @@ async def _every(seconds: float, act: Callable[[], Any]) -> None:
 
 
 def _kill(service: int, tally: Tally, chance: random.Random) -> None:
-    workers = _workers(service)
+    workers = workers_of(service)
     if workers:
         os.kill(chance.choice(workers), signal.SIGKILL)
         tally.kills += 1
-
-
-def _children(process: int) -> list[int]:
-    listed = Path(f"/proc/{process}/task").glob("*/children")
-    return sorted(int(child) for file in listed for child in file.read_text().split())
-
-
-def _workers(service: int) -> list[int]:
-    """They are forked from a process that is the service's only child."""
-    return [worker for nursery in _children(service) for worker in _children(nursery)]
 
 
 async def _weigh(service: int, tally: Tally) -> None:
     while True:
         tally.memory.append(await asyncio.to_thread(Memory.of, service))
         await asyncio.sleep(_WEIGHED)
-
-
-def _shared_out(process: int) -> float:
-    """MB of a process; what several share, in equal parts."""
-    try:
-        told = Path(f"/proc/{process}/smaps_rollup").read_text()
-    except (FileNotFoundError, ProcessLookupError):
-        return 0.0
-    found = re.search(r"^Pss:\s+(\d+) kB", told, re.MULTILINE)
-    return 0.0 if found is None else 1.024e-3 * int(found[1])
 
 
 def main(

@@ -67,6 +67,7 @@ def _get_warm() -> None:
         load_kept_kernels()
     gc.collect()
     gc.freeze()  # the collector of a worker would write to what it shares with the others
+    gc.collect()  # of nothing: a full collection is due after a quarter more than the last one has left
 
 
 def _fork(link: socket.socket, *descriptors: int) -> None:

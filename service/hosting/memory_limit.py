@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
-import gc
 import mmap
 import re
 import resource
 import time
 from pathlib import Path
 from typing import Final
+
+from service.hosting.spare_memory import give_back
 
 _INTERVAL: Final = 0.2
 """Seconds between two looks"""
@@ -42,7 +42,7 @@ class MemoryLimit:
         self._due = now + _INTERVAL
         if _resident() <= self._most:
             return False
-        _give_back()
+        give_back()
         return _resident() > self._most
 
     @property
@@ -53,14 +53,6 @@ class MemoryLimit:
             "paused. An edit or a change of settings lets it go on: fewer elements, or a larger "
             "error_tolerance, take less."
         )
-
-
-def _give_back() -> None:
-    """Let go of what nobody uses any more, and of what the C library keeps for later."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
 
 
 def _resident() -> int:

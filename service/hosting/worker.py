@@ -33,6 +33,7 @@ from service.hosting.messages import (
     StatusChanged,
     ToWorker,
 )
+from service.hosting.spare_memory import SpareMemory
 from service.hosting.waiting import Waiting, WaitingExport, WaitingFrame, WaitingLightmap, WaitingOverlay
 from service.hosting.wire import WorkerEnd
 from solver.engine.drawing import Drawing
@@ -63,16 +64,21 @@ class Host:
         self._report_due = 0.0
         self._keeper = LightKeeper(None)
         self._memory: MemoryLimit | None = None
+        self._spare = SpareMemory()
 
     def run(self) -> NoReturn:
         """Serve for ever: the reading thread ends the process."""
         while True:
-            for message in self._arrived():
+            arrived = self._arrived()
+            for message in arrived:
                 self._serve(message)
             if self._engine is not None:
+                if arrived or self._is_busy:
+                    self._spare.note()
                 self._serve_waiting(self._engine)
                 self._work(self._engine)
                 self._keeper.keep(self._engine)
+                self._spare.give_back()
                 if not self._is_busy:
                     self._serve_waiting(self._engine)  # nothing will get better while this sleeps
 
@@ -94,10 +100,10 @@ class Host:
         return self._busy or any(waiting.is_working for waiting in self._waiting.values())
 
     def _spare_time(self) -> float | None:
-        """Seconds until a waiting request must be answered, or light be kept; None: there is neither."""
+        """Seconds until a waiting request must be answered, light be kept, or memory be given back; None:
+        there is nothing of these."""
         times = [waiting.deadline for waiting in self._waiting.values()]
-        if self._keeper.due is not None:
-            times.append(self._keeper.due)
+        times += [due for due in (self._keeper.due, self._spare.due) if due is not None]
         return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _serve(self, message: ToWorker) -> None:
