@@ -1,18 +1,19 @@
 """Edit batches taken back and brought back.
 
-Scenes are immutable and share what they have in common, so that the scene before a batch is kept as it was.
+Scenes are immutable and share their objects, so that of the scene before a batch only those are kept that the
+batch has changed: a whole scene knows all of its objects by name, which of a thousand scenes is not little.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Protocol, TypeVar
 
 from solver.document.edits import Edit
 from solver.errors import SolverError
-from solver.geometry.scene import Scene
+from solver.geometry.scene import Scene, SceneObject
 from solver.types import ObjectId
 
 KEPT: Final = 1000
@@ -59,13 +60,70 @@ class Step:
     deeds: tuple[Deed, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """What makes one scene of another, both of the same cameras."""
+
+    changed: Mapping[ObjectId, SceneObject]
+    """Objects of the other one that are not in the first, or not as they are"""
+    gone: frozenset[ObjectId]
+    """Objects that the other one has not"""
+    places: tuple[tuple[int, ObjectId], ...]
+    """Where among the objects of the other one those are that the first has not"""
+
+    @staticmethod
+    def between(scene: Scene, other: Scene) -> Difference:
+        """What makes `other` of `scene`."""
+        first, then = scene.objects, other.objects
+        changed = {id: thing for id, thing in then.items() if first.get(id) is not thing}
+        gone = frozenset(first.keys() - then.keys())
+        places = tuple((place, id) for place, id in enumerate(then) if id not in first)
+        if list(_ordered(first, gone, places)) != list(then):
+            # What was taken away and put back has another place.
+            gone, places = frozenset(first), tuple(enumerate(then))
+        return Difference(changed, gone, places)
+
+    def of(self, scene: Scene) -> Scene:
+        """The other one, from the first."""
+        things = {**scene.objects, **self.changed}
+        if self.gone or self.places:
+            things = {id: things[id] for id in _ordered(scene.objects, self.gone, self.places)}
+        return replace(scene, objects=things)
+
+
+def _ordered(
+    ids: Iterable[ObjectId], gone: frozenset[ObjectId], places: Iterable[tuple[int, ObjectId]]
+) -> list[ObjectId]:
+    """`ids` without those that are gone, and with others at their places, first ones first."""
+    order = [id for id in ids if id not in gone]
+    for place, id in places:
+        order.insert(place, id)
+    return order
+
+
+@dataclass(frozen=True, eq=False)
+class _Turn:
+    """A step, without its scenes."""
+
+    back: Difference
+    forth: Difference
+    deeds: tuple[Deed, ...]
+
+    @staticmethod
+    def of(before: Scene, step: Step) -> _Turn:
+        back = Difference.between(step.scene, before)
+        return _Turn(back, Difference.between(before, step.scene), step.deeds)
+
+
 class History:
     """The steps that led to the scene as it stands, and those that were taken back."""
 
     def __init__(self, gesture: str | None = None) -> None:
         """Nothing has happened yet; what does by `gesture` joins the newest step, if there is one."""
-        self._past: deque[tuple[Scene, Step]] = deque(maxlen=KEPT)
-        self._future: list[tuple[Scene, Step]] = []
+        self._past: deque[_Turn] = deque(maxlen=KEPT)
+        self._future: list[_Turn] = []
+        self._standing: Scene | None = None
+        """As it stands; None while there are no steps"""
         self._gesture = gesture
 
     @classmethod
@@ -78,8 +136,12 @@ class History:
         """The history of steps, each with the scene before it: those that stand, oldest first, and those that
         were taken back, the latest last. The newest was part of `gesture`."""
         history = cls(gesture)
-        history._past.extend(past)
-        history._future.extend(future)
+        for before, step in future:
+            history._future.append(_Turn.of(before, step))
+            history._standing = before
+        for before, step in past:
+            history._past.append(_Turn.of(before, step))
+            history._standing = step.scene
         return history
 
     def record(self, before: Scene, step: Step, gesture: str | None = None) -> None:
@@ -88,29 +150,29 @@ class History:
         One of the same `gesture` as the one before is taken back together with that.
         """
         if gesture is not None and gesture == self._gesture and self._past:
-            before, first = self._past.pop()
-            step = Step(step.scene, joined(first.deeds, step.deeds))
-        self._past.append((before, step))
+            first = self._past.pop()
+            before, step = first.back.of(before), Step(step.scene, joined(first.deeds, step.deeds))
+        self._past.append(_Turn.of(before, step))
         self._future.clear()
-        self._gesture = gesture
+        self._standing, self._gesture = step.scene, gesture
 
     def undo(self) -> Step:
         """The step that takes back the newest batch. Raises NothingToReverseError."""
-        if not self._past:
+        if not self._past or self._standing is None:
             raise NothingToReverseError("undo")
-        self._gesture = None
-        before, step = self._past.pop()
-        self._future.append((before, step))
-        return Step(before, taken_back(step.deeds))
+        turn = self._past.pop()
+        self._future.append(turn)
+        self._standing, self._gesture = turn.back.of(self._standing), None
+        return Step(self._standing, taken_back(turn.deeds))
 
     def redo(self) -> Step:
         """The step that brings back what was taken back last. Raises NothingToReverseError."""
-        if not self._future:
+        if not self._future or self._standing is None:
             raise NothingToReverseError("redo")
-        self._gesture = None
-        before, step = self._future.pop()
-        self._past.append((before, step))
-        return step
+        turn = self._future.pop()
+        self._past.append(turn)
+        self._standing, self._gesture = turn.forth.of(self._standing), None
+        return Step(self._standing, turn.deeds)
 
 
 def joined(first: Sequence[T], second: Sequence[T]) -> tuple[T, ...]:

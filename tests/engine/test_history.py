@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from solver.engine import history
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
-from solver.engine.history import NothingToReverseError
+from solver.engine.history import Difference, NothingToReverseError
 from solver.engine.status import ChangeState
+from solver.geometry.scene import Scene
 from solver.illumination.settings import LightSettings
 from tests.engine.acting import edits, settle
 from tests.engine.scenes import box
@@ -39,21 +43,27 @@ def told(engine: Engine) -> list[tuple[str, str]]:
     return [(entry.op, entry.id) for entry in engine.log()]
 
 
+def assert_is(engine: Engine, scene: Scene, revision: int) -> None:
+    """The very objects, in their order."""
+    assert list(engine.scene) == list(scene)
+    assert engine.revision == revision
+
+
 def test_batches_are_taken_back_and_brought_back_whole(engine: Engine) -> None:
     scenes = [engine.scene]
     for batch in ([move(0.1), paint(0.2)], [{"op": "remove", "id": "crate"}]):
         engine.apply(edits(*batch))
         scenes.append(engine.scene)
     changes = engine.undo()
-    assert (engine.scene, engine.revision) == (scenes[1], 4)
+    assert_is(engine, scenes[1], 4)
     assert [(change.op, change.id) for change in changes] == [("add", "crate")]
     changes = engine.undo()
-    assert (engine.scene, engine.revision) == (scenes[0], 5)
+    assert_is(engine, scenes[0], 5)
     assert [(change.op, change.id) for change in changes] == [("set_material", "floor"), ("move", "crate")]
     engine.redo()
-    assert (engine.scene, engine.revision) == (scenes[1], 6)
+    assert_is(engine, scenes[1], 6)
     engine.redo()
-    assert (engine.scene, engine.revision) == (scenes[2], 7)
+    assert_is(engine, scenes[2], 7)
 
 
 def test_there_may_be_nothing_to_take_back(engine: Engine) -> None:
@@ -80,6 +90,35 @@ def test_a_refused_batch_leaves_no_trace(engine: Engine) -> None:
     with pytest.raises(NothingToReverseError):
         engine.undo()
     assert engine.log() == ()
+
+
+@given(st.lists(st.tuples(st.sampled_from(["add", "remove", "paint"]), st.integers(0, 4)), max_size=8))
+def test_a_scene_is_another_one_and_what_is_different(deeds: list[tuple[str, int]]) -> None:
+    before = after = box()
+    crate = before.object("crate")
+    for deed, number in deeds:
+        name = f"crate{number}"
+        if deed == "add" and name not in after.objects:
+            after = after.with_object(replace(crate, id=name))
+        elif deed == "remove" and name in after.objects:
+            after = after.without_object(name)
+        elif deed == "paint" and name in after.objects:
+            after = after.with_replaced(replace(after.object(name)))
+        if number == 0:
+            before = after
+    for one, other in ((before, after), (after, before)):
+        found = Difference.between(one, other)
+        assert list(found.of(one)) == list(other), "the very objects, in their order"
+
+
+def test_a_batch_of_many_objects_keeps_those_that_it_changed() -> None:
+    before = box()
+    for number in range(500):
+        before = before.with_object(replace(before.object("crate"), id=f"crate{number}"))
+    after = before.without_object("crate7").with_replaced(replace(before.object("crate9")))
+    found = Difference.between(after, before)
+    assert (set(found.changed), found.gone) == ({"crate7", "crate9"}, frozenset())
+    assert [id for _, id in found.places] == ["crate7"]
 
 
 def test_only_so_many_batches_are_kept(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
