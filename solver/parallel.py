@@ -1,4 +1,8 @@
-"""Spread ranges of GIL-free work (numba kernels, Embree queries) over all cores of the process."""
+"""Spread ranges of GIL-free work (numba kernels, Embree queries) over all cores of the process.
+
+numpy's BLAS has threads of its own, which wait for work in a loop and so take a core from all others for a
+while after every product of matrices. Nothing here has matrices large enough to be worth that: BLAS gets one.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,11 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 from typing import Final
+
+import numpy as np  # noqa: F401  (BLAS has to be there to be told)
+from threadpoolctl import threadpool_limits
+
+threadpool_limits(limits=1, user_api="blas")
 
 _PIECES_PER_CORE: Final = 3
 """Pieces into which a small range is cut, so that cores end at about the same time."""

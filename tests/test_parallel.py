@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_info
 
 from solver.parallel import core_count, run_chunks
 
@@ -48,3 +49,13 @@ def test_an_exception_of_a_piece_is_raised_after_all_have_ended(bad: int) -> Non
 
     with pytest.raises(ValueError, match="broken piece"):
         run_chunks(work, 8, 1)
+
+
+def test_blas_has_no_threads_that_wait_in_a_loop() -> None:
+    # That of scipy, which the project does without, comes when tests ask for it.
+    threads = [
+        pool["num_threads"]
+        for pool in threadpool_info()
+        if pool["user_api"] == "blas" and "numpy" in pool["filepath"]
+    ]
+    assert threads == [1]
