@@ -413,7 +413,7 @@ class Redistribution(RadiositySolver):
         first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
         first[self._fresh] = state.emission[self._fresh].any(axis=1)
         lit = first[tree.patch[p]] | first[tree.patch[q]]
-        order = np.lexsort((-urgency, ~lit))
+        order = np.argsort(np.where(lit, -1.0 - urgency.max(initial=0.0), 0.0) - urgency)
         faint = np.cumsum(urgency[order][::-1])[::-1] < _IDLE * self.settings.error_tolerance**2 * self.norm
         faint &= urgency[order] < _FAINT * self.bound
         paired = order[order >= len(rows)] - len(rows)

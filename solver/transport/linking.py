@@ -7,6 +7,7 @@ blockers. Pairs without blockers cost no ray ("model only what a scene needs").
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -17,9 +18,9 @@ from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkBatch, LinkTable, take_ranges
 from solver.transport.oracle import MAX_SAMPLES, samples_needed
-from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, list_facing
+from solver.transport.pairs import find_exchange, find_slopes, inherit_blockers, mark_facing
 from solver.transport.settings import Saving
-from solver.types import BoolArray, FloatArray, Int64Array, IntArray
+from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import rays_through, visible_fractions
@@ -98,24 +99,26 @@ class Linker:
         ranked by their places.
         """
         s = self.surfaces
-        counts = np.zeros(stop - start, dtype=np.int64)
-        empty = np.empty(0, dtype=np.int32)
+        middle, reach = self.extents
+        facing = np.zeros((stop - start, s.patch_count), dtype=np.bool_)
 
-        def count(a: int, b: int) -> None:
-            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, members, rank, start,
-                    start + a, start + b, counts, False, empty, empty)  # fmt: skip
+        def mark(a: int, b: int) -> None:
+            mark_facing(
+                s.corners, s.corner_count, s.normal, middle, reach, self.side_tolerance, members, rank, start,
+                start + a, start + b, facing,
+            )  # fmt: skip
 
-        run_chunks(count, stop - start, 64, 8)
-        total = int(counts.sum())
-        p, q = np.empty(total, dtype=np.int32), np.empty(total, dtype=np.int32)
-        first = np.cumsum(counts) - counts
+        run_chunks(mark, stop - start, 64, 8)
+        member, other = np.nonzero(facing)
+        one, other = members[start + member], other.astype(np.int32)
+        return np.minimum(one, other), np.maximum(one, other)
 
-        def fill(a: int, b: int) -> None:
-            list_facing(s.corners, s.corner_count, s.normal, self.side_tolerance, members, rank, start,
-                    start + a, start + b, first, True, p, q)  # fmt: skip
-
-        run_chunks(fill, stop - start, 64, 8)
-        return p, q
+    @cached_property
+    def extents(self) -> tuple[Points, FloatArray]:
+        """Middles (p, 3) of all patches, and how far (p,) from these their corners are, metres."""
+        corners = self.surfaces.corners
+        middle = corners.mean(axis=1)
+        return middle, np.sqrt(np.max(((corners - middle[:, None]) ** 2).sum(axis=2), axis=1))
 
     def link(
         self, tree: ElementTree, p: IntArray, q: IntArray, light: Light, keep_dark: bool = False

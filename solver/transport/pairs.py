@@ -7,51 +7,54 @@ import numpy as np
 from solver.kernels import kernel
 from solver.transport.exchange import exchange_area, heights
 from solver.transport.variation import form_factor_variation, solve_moment
-from solver.types import Corners, FloatArray, Int64Array, IntArray, Points
+from solver.types import BoolArray, Corners, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.blockers import inherited_blockers
 from solver.visibility.culling import BLOCK, LANES, gather_blocks
 from solver.visibility.shafts import FULL, MAX_PLANES, NONE
 
 
 @kernel
-def list_facing(
+def mark_facing(
     corners: Corners,
     counts: IntArray,
     normals: FloatArray,
+    middle: Points,
+    reach: FloatArray,
     tolerance: float,
     members: IntArray,
     rank: IntArray,
     base: int,
     start: int,
     stop: int,
-    slot: Int64Array,
-    write: bool,
-    out_p: IntArray,
-    out_q: IntArray,
+    facing: BoolArray,
 ) -> None:
-    """Count, or write from slot[k - base], the patches that members[k], k in [start, stop), faces.
+    """Mark in the rows facing[k - base] (p,) which patches members[k], k in [start, stop), faces.
 
     Those of less than its own `rank` (p,) are left out, so that members that are ranked by their places are
-    paired once.
+    paired once. middle (p, 3), reach (p,): the middle of each patch, and how far from it its corners are.
     """
     for k in range(start, stop):
         p = members[k]
-        found = 0
         for q in range(len(corners)):
             if q == p or rank[q] < rank[p]:
                 continue
-            _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
-            if high <= tolerance:
+            # Most of all pairs are told by the middles: the corners are asked where these are near the plane.
+            over_p = 0.0
+            over_q = 0.0
+            for axis in range(3):
+                over_p += (middle[q, axis] - corners[p, 0, axis]) * normals[p, axis]
+                over_q += (middle[p, axis] - corners[q, 0, axis]) * normals[q, axis]
+            if over_p + reach[q] < 0.0 or over_q + reach[p] < 0.0:
                 continue
-            _, high = heights(corners[p], counts[p], corners[q, 0], normals[q])
-            if high <= tolerance:
-                continue
-            if write:
-                out_p[slot[k - base] + found] = min(p, q)
-                out_q[slot[k - base] + found] = max(p, q)
-            found += 1
-        if not write:
-            slot[k - base] = found
+            if over_p <= 2.0 * tolerance:
+                _, high = heights(corners[q], counts[q], corners[p, 0], normals[p])
+                if high <= tolerance:
+                    continue
+            if over_q <= 2.0 * tolerance:
+                _, high = heights(corners[p], counts[p], corners[q, 0], normals[q])
+                if high <= tolerance:
+                    continue
+            facing[k - base, q] = True
 
 
 @kernel
