@@ -2,12 +2,13 @@
 
 Scenes are immutable and share their objects, so that of the scene before a batch only those are kept that the
 batch has changed: a whole scene knows all of its objects by name, which of a thousand scenes is not little.
+They are kept bare, without what has been made of them, which lives as long as they do and may be far more.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol, TypeVar
 
@@ -31,7 +32,7 @@ class NothingToReverseError(SolverError):
         super().__init__(f"there is nothing to {what}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Deed:
     """What happens to one object."""
 
@@ -60,13 +61,13 @@ class Step:
     deeds: tuple[Deed, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Difference:
     """What makes one scene of another, both of the same cameras."""
 
-    changed: Mapping[ObjectId, SceneObject]
+    changed: tuple[SceneObject, ...]
     """Objects of the other one that are not in the first, or not as they are"""
-    gone: frozenset[ObjectId]
+    gone: tuple[ObjectId, ...]
     """Objects that the other one has not"""
     places: tuple[tuple[int, ObjectId], ...]
     """Where among the objects of the other one those are that the first has not"""
@@ -75,33 +76,39 @@ class Difference:
     def between(scene: Scene, other: Scene) -> Difference:
         """What makes `other` of `scene`."""
         first, then = scene.objects, other.objects
-        changed = {id: thing for id, thing in then.items() if first.get(id) is not thing}
-        gone = frozenset(first.keys() - then.keys())
+        changed = tuple(_bare(thing) for id, thing in then.items() if first.get(id) is not thing)
+        gone = tuple(id for id in first if id not in then)
         places = tuple((place, id) for place, id in enumerate(then) if id not in first)
-        if list(_ordered(first, gone, places)) != list(then):
+        if _ordered(first, gone, places) != list(then):
             # What was taken away and put back has another place.
-            gone, places = frozenset(first), tuple(enumerate(then))
+            gone, places = tuple(first), tuple(enumerate(then))
         return Difference(changed, gone, places)
 
     def of(self, scene: Scene) -> Scene:
         """The other one, from the first."""
-        things = {**scene.objects, **self.changed}
+        things = {**scene.objects, **{thing.id: _bare(thing) for thing in self.changed}}
         if self.gone or self.places:
             things = {id: things[id] for id in _ordered(scene.objects, self.gone, self.places)}
         return replace(scene, objects=things)
 
 
+def _bare(thing: SceneObject) -> SceneObject:
+    """The same object, of which nothing has been made yet."""
+    return replace(thing)
+
+
 def _ordered(
-    ids: Iterable[ObjectId], gone: frozenset[ObjectId], places: Iterable[tuple[int, ObjectId]]
+    ids: Iterable[ObjectId], gone: Collection[ObjectId], places: Iterable[tuple[int, ObjectId]]
 ) -> list[ObjectId]:
     """`ids` without those that are gone, and with others at their places, first ones first."""
-    order = [id for id in ids if id not in gone]
+    left_out = frozenset(gone)
+    order = [id for id in ids if id not in left_out]
     for place, id in places:
         order.insert(place, id)
     return order
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class _Turn:
     """A step, without its scenes."""
 
