@@ -150,8 +150,9 @@ def _drag(engine: Engine, edit: Edit, after: Scene, moves: int) -> Drag:
         now = time.perf_counter()
         times.append(now - previous)
         previous = now
-        # Light follows even where moves come faster than they are taken.
-        engine.step(_SLICE)
+        if now - start < PAUSE * done:
+            # Nothing is due yet.
+            engine.step(_SLICE)
     count, seconds = len(times), previous - start
     return Drag(count, taken, count / seconds, max(times), applied / taken, drawn / count, looks // taken)
 

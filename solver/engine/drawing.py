@@ -18,7 +18,7 @@ from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.rendering.device import GlDevice
 from solver.rendering.encoding import PictureFormat, encode_linear, encode_picture
 from solver.rendering.layers import picture_of
-from solver.rendering.renderer import FrameRenderer, Layer, Shading
+from solver.rendering.renderer import FrameRenderer, Layer, Meanwhile, Shading
 from solver.rendering.tessellation import RenderMesh, Tessellator
 from solver.rendering.tone_mapping import tone_map
 from solver.transport.field import RadiosityField
@@ -89,12 +89,14 @@ class Drawing:
         renderer: RendererName,
         layer: LayerName,
         samples: int,
+        meanwhile: Meanwhile | None = None,
     ) -> AnyArray:
         """A layer of `field` as `camera` sees it, (height, width, ...), top row first.
 
         Radiance in W/(m2 sr), irradiance in W/m2, illuminance in lux, depth and position in metres. The
         interpolant renderer draws the field as gouraud does: of layers that only interpolants have, nothing
-        is known. Raises NotAvailableError, RenderingUnavailableError.
+        is known. `meanwhile` is called while light is drawn. Raises NotAvailableError,
+        RenderingUnavailableError.
         """
         self.require(renderer, layer)
         if layer in _FINE_LAYERS:
@@ -106,7 +108,8 @@ class Drawing:
             return np.full(shape, np.nan, dtype=np.float32)
         if renderer is RendererName.INTERPOLANT:
             renderer = RendererName.GOURAUD
-        return self.draw_mesh(world, self.mesh_of(world, field), camera, renderer, layer, samples)
+        mesh = self.mesh_of(world, field)
+        return self.draw_mesh(world, mesh, camera, renderer, layer, samples, meanwhile)
 
     def draw_mesh(
         self,
@@ -116,9 +119,11 @@ class Drawing:
         renderer: RendererName,
         layer: LayerName,
         samples: int,
+        meanwhile: Meanwhile | None = None,
     ) -> AnyArray:
         """A layer of `mesh` as `camera` sees it; as `draw`. Raises RenderingUnavailableError."""
-        image = self.require_device().draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples)
+        device = self.require_device()
+        image = device.draw(mesh, camera, _SHADINGS[renderer], _LAYERS[layer], samples, meanwhile)
         return world.scene.luminous_efficacy * image if layer is LayerName.ILLUMINANCE else image
 
     def pixels_by_triangle(self, mesh: InterpolantMesh, camera: Camera) -> FloatArray:

@@ -73,6 +73,13 @@ from solver.types import LUMINANCE_WEIGHTS, FloatArray, ObjectId, Points
 _FIRST_LOOK: Final = 0.02
 """Seconds of work before the first frame after an edit: in it the strongest shadows have moved."""
 
+_GLANCE: Final = 0.012
+"""The same in the midst of a drag, where the next frame is soon asked for"""
+
+_MEANWHILE: Final = 2.5e-8
+"""Seconds of work in the midst of a drag while a frame is drawn, a pixel and sample: software OpenGL takes at
+least that long, and leaves cores idle"""
+
 
 class Engine:
     """A scene, its solution, and the frames of it."""
@@ -263,9 +270,11 @@ class Engine:
         """
         self._catch_up(_FIRST_LOOK)
         view = self._view(request)
+        # The light may have changed by the time that the picture of it is there.
+        outlook = self._outlook(request, view)
         start = time.perf_counter()
         image = view.draw()
-        return Frame(image, self._outlook(request, view), time.perf_counter() - start)
+        return Frame(image, outlook, time.perf_counter() - start)
 
     def probe(self, positions: Points, normals: FloatArray) -> ProbeResult:
         """Measure the light at points (n, 3) with normals (n, 3) of any length, as `light_at` does."""
@@ -386,9 +395,12 @@ class Engine:
             raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
         fine = self._fine_light()
         shown = RendererName.GOURAUD if renderer is RendererName.GATHER else renderer
+        solution, glance = self._solution, _MEANWHILE * camera.width * camera.height * request.samples
+        drags = self._drags and solution.state is SessionState.SOLVING and self._halted is None
         view = SolutionView(
-            self._solution, self._drawing, self._seen_errors, camera, shown, request.layer, request.samples
-        )
+            solution, self._drawing, self._seen_errors, camera, shown, request.layer, request.samples,
+            (lambda: solution.step(glance)) if drags else None,
+        )  # fmt: skip
         if renderer is RendererName.GATHER:
             return self._gather_view(fine, view)
         if renderer is not RendererName.INTERPOLANT or self._solution.is_sampled:
@@ -462,7 +474,7 @@ class Engine:
         if self._is_behind:
             self._settle(self._world, self._solution, self._drags)
             if first_look > 0.0:
-                self._solution.step(first_look)
+                self._solution.step(min(first_look, _GLANCE) if self._drags else first_look)
 
     def _progress(self) -> Progress:
         solver, shots = self._solution.solver, self._solution.solver.shots

@@ -24,6 +24,7 @@ from solver.engine.status import SessionState
 from solver.engine.world import World
 from solver.geometry.scene import Camera
 from solver.rendering.false_colour import false_colour
+from solver.rendering.renderer import Meanwhile
 from solver.types import LUMINANCE_WEIGHTS, AnyArray
 
 
@@ -99,6 +100,8 @@ class SolutionView:
     renderer: RendererName
     layer: LayerName
     samples: int
+    meanwhile: Meanwhile | None = None
+    """What is done while a frame of it is drawn"""
 
     @property
     def drawable(self) -> bool:
@@ -133,8 +136,9 @@ class SolutionView:
         """The picture. Raises RenderingUnavailableError."""
         world = self.solution.world
         return self.drawing.draw(
-            world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples
-        )
+            world, self.solution.field(), self.camera, self.renderer, self.layer, self.samples,
+            self.meanwhile,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

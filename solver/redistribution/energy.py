@@ -13,7 +13,7 @@ import numpy as np
 from solver.kernels import inline_kernel, kernel
 from solver.transport.oracle import link_weight
 from solver.transport.state import TransportState
-from solver.types import FloatArray, IntArray, Points
+from solver.types import BoolArray, FloatArray, IntArray, Points
 
 
 @kernel
@@ -28,21 +28,25 @@ def rank_links(
     radiosity: FloatArray,
     reflectance: FloatArray,
     boxes: FloatArray,
+    known: BoolArray,
     energy: FloatArray,
     share: FloatArray,
     urgency: FloatArray,
+    start: int,
+    stop: int,
 ) -> None:
     """W (k,) of luminance that pairs of elements p, q (k,) reflect of each other's light, at most; the share
     (k,) of it that something can have hidden or shown; that, squared, over the area it falls on, (W/m2)^2 m2.
 
-    exchange (k,) m2 where it is known, 0 where it is not: then the elements are taken for points, but for
-    no more than the smaller one's area. boxes (n, 2, 3): what came or went between the ends; of none, all of
-    the light is at stake. Per element: area, centroid, patch, mean radiosity, reflectance.
+    Of the pairs from start to stop. exchange (l,) m2 of the first ones; of the rest the elements are taken
+    for points, but for no more than the smaller one's area. boxes (n, 2, 3): what came or went between the
+    ends of the first ones that are `known` (l,); of all others all of the light is at stake. Per element:
+    area, centroid, patch, mean radiosity, reflectance.
     """
-    for k in range(len(p)):
+    for k in range(start, stop):
         i = p[k]
         j = q[k]
-        g = exchange[k]
+        g = exchange[k] if k < len(exchange) else 0.0
         square = 0.0
         cos_i = 0.0
         cos_j = 0.0
@@ -57,14 +61,16 @@ def rank_links(
             slack = 0.25 * np.sqrt(spread)
             far = (max(cos_i, 0.0) + slack) * (max(cos_j, 0.0) + slack) / (np.pi * (square + spread) ** 2)
             g = min(area[i], area[j], area[i] * area[j] * far)
-        hidden = 1.0 if len(boxes) == 0 else 0.0
-        for box in range(len(boxes)):
-            hidden = max(
-                hidden,
-                _share_hidden(
-                    centroid[i], centroid[j], square, area[i], area[j], boxes[box, 0], boxes[box, 1]
-                ),
-            )
+        hidden = 1.0
+        if k < len(known) and known[k] and len(boxes) > 0:
+            hidden = 0.0
+            for box in range(len(boxes)):
+                hidden = max(
+                    hidden,
+                    _share_hidden(
+                        centroid[i], centroid[j], square, area[i], area[j], boxes[box, 0], boxes[box, 1]
+                    ),
+                )
         share[k] = hidden
         energy[k] = g * (radiosity[i] * reflectance[j] + radiosity[j] * reflectance[i])
         urgency[k] = link_weight(

@@ -20,6 +20,7 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
+from solver.parallel import run_chunks
 from solver.redistribution.carrying import carry, moments_of, moments_of_more, sent_over
 from solver.redistribution.debts import UnlinkedPairs, owe
 from solver.redistribution.energy import doubt_of, rank_links, unshot_square
@@ -78,6 +79,9 @@ it as noise"""
 
 _FAINT: Final = 0.1
 """The same of one of them, of what is refined"""
+
+_RANKED: Final = 1 << 14
+"""Debts of a piece of work"""
 
 _FOLDED: Final = 0.03
 """Elements without links are folded back when they are more than this share of all."""
@@ -213,9 +217,10 @@ class Redistribution(RadiositySolver):
     def owed(self) -> dict[int, float]:
         """W of luminance that is still at stake, by the numbers of the edits that it is owed to."""
         plan = self._plan or self._make_plan()
-        debt, energy = plan.debt[self._paid :], plan.energy[self._paid :]
-        numbers, place = np.unique(np.abs(debt), return_inverse=True)
-        return dict(zip(numbers.tolist(), np.bincount(place, energy, len(numbers)).tolist(), strict=True))
+        number, energy = np.abs(plan.debt[self._paid :]), plan.energy[self._paid :]
+        total = np.bincount(number, energy)
+        present = np.flatnonzero(np.bincount(number))
+        return dict(zip(present.tolist(), total[present].tolist(), strict=True))
 
     # --- the work, in slices -------------------------------------------------------------------------
 
@@ -396,35 +401,36 @@ class Redistribution(RadiositySolver):
         reflectance = (state.reflectance @ state.weights)[tree.patch]
         p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
         energy, share, urgency = np.empty((3, len(p)))
-        known = np.abs(links.debt[rows]) == self._number
         # What hides links that are in debt to earlier edits is not known any more.
-        for chosen, boxes in (
-            (np.flatnonzero(known), self._boxes),
-            (np.append(np.flatnonzero(~known), np.arange(len(rows), len(p))), self._boxes[:0]),
-        ):
-            exchange = np.append(links.open_exchange[rows], np.zeros(len(pairs)))[chosen]
-            found = np.empty((3, len(chosen)))
-            rank_links(
-                p[chosen], q[chosen], exchange, tree.area, tree.centroid, tree.patch, self.surfaces.normal,
-                radiosity, reflectance, boxes, found[0], found[1], found[2],
-            )  # fmt: skip
-            energy[chosen], share[chosen], urgency[chosen] = found
+        known, exchange = np.abs(links.debt[rows]) == self._number, links.open_exchange[rows]
+        run_chunks(
+            lambda start, stop: rank_links(
+                p, q, exchange, tree.area, tree.centroid, tree.patch, self.surfaces.normal, radiosity,
+                reflectance, self._boxes, known, energy, share, urgency, start, stop,
+            ),
+            len(p),
+            _RANKED,
+        )  # fmt: skip
         # What an emitter sends out that came with the edit is what everybody looks at.
         first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
         first[self._fresh] = state.emission[self._fresh].any(axis=1)
-        lit = first[tree.patch[p]] | first[tree.patch[q]]
-        order = np.argsort(np.where(lit, -1.0 - urgency.max(initial=0.0), 0.0) - urgency)
-        faint = np.cumsum(urgency[order][::-1])[::-1] < _IDLE * self.settings.error_tolerance**2 * self.norm
-        faint &= urgency[order] < _FAINT * self.bound
+        rank = urgency
+        if first.any():
+            lit = first[tree.patch[p]] | first[tree.patch[q]]
+            rank = urgency + np.where(lit, 1.0 + urgency.max(initial=0.0), 0.0)
+        order = np.argsort(-rank)
+        urgency, energy = urgency[order], energy[order]
+        faint = _sums_from(urgency)[:-1] < _IDLE * self.settings.error_tolerance**2 * self.norm
+        faint &= urgency < _FAINT * self.bound
         paired = order[order >= len(rows)] - len(rows)
         self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
         self._plan = _Plan(
-            doubt=doubt_of(p, q, energy, tree.area) / math.sqrt(max(self.norm, 1e-300)),
+            doubt=doubt_of(p[order], q[order], energy, tree.area) / math.sqrt(max(self.norm, 1e-300)),
             rows=np.concatenate([rows, np.full(len(pairs), -1, dtype=np.int32)])[order],
             debt=np.concatenate([links.debt[rows], pairs.debt])[order],
-            energy=energy[order],
+            energy=energy,
             doubt_of_each=np.where(faint, share[order] ** 2, 0.0),
-            left=np.append(np.cumsum(energy[order][::-1])[::-1], 0.0),
+            left=_sums_from(energy),
             light=Light(radiosity, reflectance, NOISE_SHARE * self.bound),
         )
         self._paid = 0
@@ -530,3 +536,10 @@ class Redistribution(RadiositySolver):
         rank[left] = np.arange(len(left), dtype=np.int32)
         p, q = self._linker.facing_pairs(left, rank, 0, len(left))
         return pairs.joined(UnlinkedPairs(p, q, np.full(len(p), number, dtype=np.int32)))
+
+
+def _sums_from(values: FloatArray) -> FloatArray:
+    """The sums (n + 1,) of each of `values` (n,) and all that follow."""
+    sums = np.zeros(len(values) + 1)
+    np.cumsum(values[::-1], out=sums[-2::-1])
+    return sums

@@ -25,7 +25,7 @@ from solver.rendering.surface_points import SurfacePoints, surface_points
 from solver.rendering.targets import Pixel, Target, Targets, require_drawable
 from solver.types import LUMINANCE_WEIGHTS, AnyArray, BoolArray, Float32Array, IntArray
 
-__all__ = ["FrameRenderer", "Layer", "Shading", "needs_interpolants"]
+__all__ = ["FrameRenderer", "Layer", "Meanwhile", "Shading", "needs_interpolants"]
 
 
 class Shading(StrEnum):
@@ -44,6 +44,9 @@ def needs_interpolants(shading: Shading, layer: Layer) -> bool:
     """Whether only a mesh of interpolants has such a frame."""
     return shading is Shading.INTERPOLANT or layer is Layer.ERROR
 
+
+Meanwhile: TypeAlias = Callable[[], object]
+"""What is done while a device draws, which software does on all cores, too, but not all of the time."""
 
 _Painter: TypeAlias = Callable[[Viewpoint, Target], None]
 """Draws what a viewpoint sees into a target of colours."""
@@ -70,7 +73,13 @@ class FrameRenderer:
         return 0 if self._scene is None else self._scene.uploaded
 
     def draw(
-        self, mesh: DrawnMesh, camera: Camera, shading: Shading, layer: Layer, samples: int = 1
+        self,
+        mesh: DrawnMesh,
+        camera: Camera,
+        shading: Shading,
+        layer: Layer,
+        samples: int = 1,
+        meanwhile: Meanwhile | None = None,
     ) -> AnyArray:
         """A frame of `mesh` seen by `camera`, top row first.
 
@@ -82,7 +91,8 @@ class FrameRenderer:
         element and triangle (h, w) int32, -1; barycentric (h, w, 3) float32, 0; error (h, w) float32 W/m2, 0.
         Backs have the normal of their front, and no error.
 
-        What is uploaded stays on the device for as long as the same arrays are drawn. Raises NotInMeshError,
+        `meanwhile` is called while the device draws light, once it has all that it needs. What is uploaded
+        stays there for as long as the same arrays are drawn. Raises NotInMeshError,
         LimitExceededError or SceneError naming width, height or samples, DeviceUseError, and MemoryError.
         """
         require_drawable(camera, samples, self._device)
@@ -92,9 +102,11 @@ class FrameRenderer:
             scene = self._hold(mesh)
             match layer:
                 case Layer.RADIANCE | Layer.IRRADIANCE:
-                    return self._draw_light(scene, camera, shading, layer, samples)
+                    return self._draw_light(scene, camera, shading, layer, samples, meanwhile)
                 case Layer.ILLUMINANCE | Layer.FALSE_COLOUR:
-                    irradiance = self._draw_light(scene, camera, shading, Layer.IRRADIANCE, samples)
+                    irradiance = self._draw_light(
+                        scene, camera, shading, Layer.IRRADIANCE, samples, meanwhile
+                    )
                     illuminance = irradiance @ LUMINANCE_WEIGHTS.astype(np.float32)
                     return illuminance if layer is Layer.ILLUMINANCE else false_colour(illuminance)
                 case Layer.ERROR if isinstance(mesh, InterpolantMesh):
@@ -168,7 +180,13 @@ class FrameRenderer:
         return self._scene
 
     def _draw_light(
-        self, scene: GpuMesh, camera: Camera, shading: Shading, layer: Layer, samples: int
+        self,
+        scene: GpuMesh,
+        camera: Camera,
+        shading: Shading,
+        layer: Layer,
+        samples: int,
+        meanwhile: Meanwhile | None,
     ) -> Float32Array:
         paint = self._painter(scene, shading, layer)
         size = (camera.width, camera.height)
@@ -176,6 +194,7 @@ class FrameRenderer:
         frame = self._targets.get(size, Pixel.COLOUR)
         if samples == 1:
             paint(Viewpoint(camera.eye, projection), frame)
+            self._wait(meanwhile)
             return _read_colours(frame)
         total = self._targets.get(size, Pixel.COLOUR, has_depth=False)
         total.framebuffer.clear()
@@ -184,7 +203,14 @@ class FrameRenderer:
             jitter = (-2.0 * right / camera.width, -2.0 * down / camera.height)
             paint(Viewpoint(camera.eye, projection, jitter), frame)
             self._accumulation.add(frame, 1.0 / samples, total)
+        self._wait(meanwhile)
         return _read_colours(total)
+
+    def _wait(self, meanwhile: Meanwhile | None) -> None:
+        """Do something else while the device draws."""
+        if meanwhile is not None:
+            self._device.entry_points.begin()
+            meanwhile()
 
     def _painter(self, scene: GpuMesh, shading: Shading, layer: Layer) -> _Painter:
         mesh = scene.mesh
