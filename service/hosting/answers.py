@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from service.hosting.messages import (
@@ -30,8 +30,8 @@ from solver.engine.drawing import encode
 from solver.engine.engine import Engine
 from solver.engine.history import NothingToReverseError
 from solver.engine.overlays.base import NotReadyError
-from solver.engine.requests import FrameRequest, NotAvailableError
-from solver.engine.views import Outlook
+from solver.engine.requests import FrameRequest, LayerName, NotAvailableError
+from solver.engine.views import Frame, Outlook
 from solver.errors import (
     LimitExceededError,
     RenderingUnavailableError,
@@ -39,7 +39,7 @@ from solver.errors import (
     SceneError,
     SolverError,
 )
-from solver.rendering.encoding import EncodingError
+from solver.rendering.encoding import EncodingError, LinearFormat, PictureFormat
 
 REFUSED: Final = (SolverError, MemoryError)
 """What an engine raises on purpose, having changed nothing."""
@@ -77,28 +77,42 @@ def answer(engine: Engine, request: AnyRequest) -> object:
             raise TypeError(f"no answer to {type(request).__name__}")
 
 
-def answer_frame(engine: Engine, request: GetFrame) -> FrameAnswer:
+@dataclass(frozen=True, eq=False)
+class DrawnFrame:
+    """A frame that has been drawn, and is to be encoded. It needs nothing of the engine any more."""
+
+    frame: Frame
+    layer: LayerName
+    """That was drawn"""
+    request: GetFrame
+
+    @property
+    def format(self) -> PictureFormat | LinearFormat:
+        """Of its file."""
+        return self.request.encoding.format
+
+    def encoded(self) -> FrameAnswer:
+        """The answer. Raises one of REFUSED."""
+        frame, request = self.frame, self.request
+        if request.presentation is None:
+            shown = Picture(encode(frame.image, self.layer, request.encoding))
+        else:
+            shown = picture(frame.image, request.frame.layer, request.encoding, request.presentation)
+        height, width = frame.image.shape[:2]
+        tag = _tag(frame.outlook, request)
+        return FrameAnswer(
+            shown.content, tag, frame.outlook, frame.seconds, width, height, shown.scale_maximum
+        )
+
+
+def draw_frame(engine: Engine, request: GetFrame) -> FrameAnswer | DrawnFrame:
     """The frame as well as it can be drawn now; not drawn if the client has it. Raises one of REFUSED."""
     wanted = drawn(engine, request)
     outlook = engine.outlook(wanted)
     tag = _tag(outlook, request)
     if tag in request.known_tags:
         return FrameAnswer(None, tag, outlook, 0.0)
-    frame = engine.frame(wanted)
-    if request.presentation is None:
-        shown = Picture(encode(frame.image, wanted.layer, request.encoding))
-    else:
-        shown = picture(frame.image, request.frame.layer, request.encoding, request.presentation)
-    height, width = frame.image.shape[:2]
-    return FrameAnswer(
-        shown.content,
-        _tag(frame.outlook, request),
-        frame.outlook,
-        frame.seconds,
-        width,
-        height,
-        shown.scale_maximum,
-    )
+    return DrawnFrame(engine.frame(wanted), wanted.layer, request)
 
 
 def drawn(engine: Engine, request: GetFrame) -> FrameRequest:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from service.hosting.answers import answer_frame, drawn
+from service.hosting.answers import DrawnFrame, draw_frame, drawn
+from service.hosting.encoding import PendingFrame
 from service.hosting.messages import (
     FrameAnswer,
     GetExport,
@@ -50,8 +51,8 @@ class WaitingFrame:
         self._request = request
         self.deadline = time.monotonic() + request.timeout
 
-    def poll(self, engine: Engine) -> FrameAnswer | None:
-        """The frame, if it is as good as asked or its time is up.
+    def poll(self, engine: Engine) -> FrameAnswer | PendingFrame | None:
+        """The frame, to be encoded unless the client has it, if it is as good as asked or its time is up.
 
         Where the time is a budget, drawing and encoding are to fit into it, by what they took before.
         """
@@ -60,7 +61,9 @@ class WaitingFrame:
         spare = engine.frame_times.expected if self._request.is_budget else 0.0
         if not worth and start < self.deadline - spare:
             return None
-        found = answer_frame(engine, self._request)
+        found = draw_frame(engine, self._request)
+        if isinstance(found, DrawnFrame):
+            return PendingFrame(found, start, engine.frame_times)
         engine.frame_times.learn(time.monotonic() - start)
         return found
 

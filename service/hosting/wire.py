@@ -9,6 +9,7 @@ import asyncio
 import pickle
 import socket
 import struct
+import threading
 from typing import Final, cast
 
 from service.hosting.messages import FromWorker, ToWorker
@@ -22,15 +23,18 @@ def _pack(message: object) -> bytes:
 
 
 class WorkerEnd:
-    """The worker's end: blocking; one thread reads, one writes."""
+    """The worker's end: blocking; one thread reads, any may write."""
 
     def __init__(self, link: socket.socket) -> None:
         self._link = link
         self._reader = link.makefile("rb")
+        self._writing = threading.Lock()
 
     def send(self, message: FromWorker) -> None:
         """Send a message. Raises OSError where the web process is gone."""
-        self._link.sendall(_pack(message))
+        packed = _pack(message)
+        with self._writing:
+            self._link.sendall(packed)
 
     def receive(self) -> ToWorker | None:
         """The next message; None where the web process is gone."""

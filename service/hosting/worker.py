@@ -2,7 +2,7 @@
 
 The main thread alternates between serving requests and slices of the engine's work. A second thread
 does nothing but read, so that the process ends at once when the web process has gone, whatever the
-main thread is doing.
+main thread is doing. A third one, once it is needed, encodes frames, so that the work goes on meanwhile.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from __future__ import annotations
 import os
 import queue
 import socket
+import sys
 import threading
 import time
 from typing import Final, NoReturn
 
 from service.hosting.answers import CHANGING, REFUSED, answer, refusal_of
 from service.hosting.board import Turn
+from service.hosting.encoding import Encoder, PendingFrame
 from service.hosting.light_keeping import LightKeeper
 from service.hosting.memory_limit import MemoryLimit
 from service.hosting.messages import (
@@ -47,6 +49,11 @@ REPORT_INTERVAL: Final = 0.1
 """Seconds between two reports while only the numbers of the status change."""
 
 
+_SWITCH: Final = 0.0005
+"""Seconds after which a thread leaves the interpreter to another that waits. A file that is encoded beside
+the work asks for it some dozens of times; by the default of 5 ms, a PNG would take twice its time."""
+
+
 class Host:
     """Serves the requests to one engine, and works on it in between."""
 
@@ -65,6 +72,7 @@ class Host:
         self._keeper = LightKeeper(None)
         self._memory: MemoryLimit | None = None
         self._spare = SpareMemory()
+        self._encoder = Encoder(end.send)
 
     def run(self) -> NoReturn:
         """Serve for ever: the reading thread ends the process."""
@@ -110,6 +118,7 @@ class Host:
         match message:
             case Abandon(number):
                 self._waiting.pop(number, None)
+                self._encoder.give_up(number)
             case Call(number, GetFrame() as request):
                 self._waiting[number] = WaitingFrame(request)
             case Call(number, GetOverlay() as request):
@@ -153,7 +162,10 @@ class Host:
                 continue
             del self._waiting[number]
             self._report()  # what an answer tells must not be ahead of the status
-            self._end.send(Answer(number, value))
+            if isinstance(value, PendingFrame):
+                self._encoder.put(number, value)
+            else:
+                self._end.send(Answer(number, value))
 
     def _work(self, engine: Engine) -> None:
         was_busy = self._busy
@@ -189,6 +201,7 @@ def _read(end: WorkerEnd, inbox: queue.SimpleQueue[ToWorker]) -> None:
 
 def main(descriptor: int, board: int) -> NoReturn:
     """Be a worker on the socket of that file descriptor, with that board, in a process of its own."""
+    sys.setswitchinterval(_SWITCH)
     end = WorkerEnd(socket.socket(fileno=descriptor))
     inbox: queue.SimpleQueue[ToWorker] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(end, inbox), name="halflight-reader", daemon=True).start()
