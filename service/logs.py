@@ -74,6 +74,8 @@ class RequestLog:
                 MutableHeaders(scope=message)["X-Request-Id"] = name
             elif message["type"] == "websocket.accept":
                 status = 101
+            elif message["type"] == "websocket.close" and status != 101:
+                status = 403  # which is how a socket is told that is closed before it was opened
             await send(message)
 
         try:

@@ -16,6 +16,7 @@ from service.app import create_app
 from service.config import ServiceSettings
 from service.context import Context
 from service.hosting.nursery import Nursery
+from service.refused_sockets import SocketProtocol
 from service.slow_clients import patient
 
 _GRACE: Final = 5
@@ -43,6 +44,7 @@ class Server(uvicorn.Server):
                 timeout_graceful_shutdown=_GRACE,
                 timeout_keep_alive=_KEPT,
                 http=patient(self._context.settings.head_seconds),
+                ws=SocketProtocol,
                 ws_max_size=self._context.settings.max_message_bytes,
                 ws_per_message_deflate=False,  # frames are compressed already
             )

@@ -98,7 +98,8 @@ class AsyncClient:
 
 
 class AsyncSession:
-    """A scene that is being lit. As a context it is ended at its end."""
+    """A scene that is being lit. As a context it is ended at its end, unless it has
+    ended before."""
 
     def __init__(self, client: AsyncClient, id: str) -> None:
         self.id = id
@@ -111,7 +112,11 @@ class AsyncSession:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        await self.close()
+        try:
+            await self.close()
+        except ProblemError as refused:
+            if refused.status != calls.NOT_THERE:
+                raise
 
     async def status(self) -> Status:
         """How it stands."""

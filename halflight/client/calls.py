@@ -19,6 +19,9 @@ T = TypeVar("T")
 _AGAIN: Final = frozenset({429, 503})
 """Status codes of what may succeed later"""
 
+NOT_THERE: Final = 404
+"""Status code of a session that has ended"""
+
 _PAUSE: Final = 0.25
 """Seconds before a request is sent again where the service does not say"""
 

@@ -97,7 +97,8 @@ class Client:
 
 
 class Session:
-    """A scene that is being lit. As a context it is ended at its end."""
+    """A scene that is being lit. As a context it is ended at its end, unless it has
+    ended before."""
 
     def __init__(self, client: Client, id: str) -> None:
         self.id = id
@@ -110,7 +111,11 @@ class Session:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except ProblemError as refused:
+            if refused.status != calls.NOT_THERE:
+                raise
 
     def status(self) -> Status:
         """How it stands."""

@@ -161,6 +161,35 @@ def test_a_stream_of_asyncio(address: str) -> None:
     assert seen[-1] == 2
 
 
+def test_a_session_may_have_ended_before_its_context(address: str) -> None:
+    with Client(address, token="ann") as client:
+        with client.open(box_document()) as session:
+            session.close()
+        with pytest.raises(ZeroDivisionError), client.open(box_document()) as session:
+            session.close()
+            raise ZeroDivisionError  # and what was raised inside is not hidden
+        with pytest.raises(ProblemError, match="404"):
+            session.close()
+
+    async def visit() -> None:
+        async with AsyncClient(address, token="ann") as client, await client.open(box_document()) as session:
+            await session.close()
+
+    asyncio.run(visit())
+
+
+def test_what_else_goes_wrong_at_the_end_of_a_context_is_told(address: str) -> None:
+    with Client(address) as none, pytest.raises(ProblemError, match="401"), none.session("any"):
+        pass
+
+    async def visit() -> None:
+        async with AsyncClient(address) as none, none.session("any"):
+            pass
+
+    with pytest.raises(ProblemError, match="401"):
+        asyncio.run(visit())
+
+
 def test_a_conflict_is_told_at_once(address: str) -> None:
     with (
         Client(address, token="ann") as client,
