@@ -20,11 +20,16 @@ from solver.engine.checkpoint_file import (
     read_checkpoint,
     write_checkpoint,
 )
+from solver.engine.checkpoint_fine import sample_count, without_interpolants
 from solver.engine.engine import Engine
 from solver.engine.status import SessionState
 
 _CALM: Final = 0.5
 """Seconds that a solution must have rested: one that is edited again and again is not written each time."""
+
+_LONG_CALM: Final = 5.0
+"""Seconds without work after which it is written once more, with the interpolants that cameras wanted:
+whoever walks through a scene wants others all the time."""
 
 _AT_REST: Final = (SessionState.CONVERGED, SessionState.PAUSED)
 
@@ -47,6 +52,8 @@ class LightKeeper:
         """Without a place, nothing is kept."""
         self._place = place
         self._kept = ""
+        self._samples = 0
+        """Of interpolants, that are kept too"""
         self._due: float | None = None
         self._wanted = threading.Event()
         self._writing = threading.Lock()
@@ -67,7 +74,7 @@ class LightKeeper:
         except (OSError, CheckpointError) as error:
             _log.warning("the light that was kept cannot be used, and is solved anew: %s", error)
             return None
-        self._kept = found.name
+        self._kept, self._samples = found.name, sample_count(found)
         return found
 
     def note(self, state: SessionState) -> None:
@@ -76,6 +83,11 @@ class LightKeeper:
             self._due = None
         elif self._due is None and not self._wanted.is_set():
             self._due = time.monotonic() + _CALM
+
+    def has_built(self) -> None:
+        """All that is looked at has been built, on a solution that may be kept already."""
+        if self._place is not None and self._wanted.is_set():
+            self._due = time.monotonic() + _LONG_CALM
 
     def give_up(self) -> None:
         """The solution is about to become another one."""
@@ -90,7 +102,11 @@ class LightKeeper:
         self._due = None
         self._wanted.set()
         checkpoint = engine.checkpoint()
-        if checkpoint is None or checkpoint.name == self._kept or checkpoint.nbytes > self._place.most_bytes:
+        if checkpoint is not None and checkpoint.nbytes > self._place.most_bytes:
+            checkpoint = without_interpolants(checkpoint)
+        if checkpoint is None or checkpoint.nbytes > self._place.most_bytes:
+            return
+        if checkpoint.name == self._kept and sample_count(checkpoint) <= self._samples:
             return
         work = (checkpoint, self._place.file, self._wanted)
         threading.Thread(target=self._write, args=work, name="halflight-keeper", daemon=True).start()
@@ -100,6 +116,6 @@ class LightKeeper:
             try:
                 file.parent.mkdir(mode=0o700, exist_ok=True)
                 if write_checkpoint(checkpoint, file, wanted.is_set):
-                    self._kept = checkpoint.name
+                    self._kept, self._samples = checkpoint.name, sample_count(checkpoint)
             except OSError as error:
                 _log.warning("the light of a session could not be kept: %s", error)

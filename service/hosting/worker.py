@@ -177,6 +177,8 @@ class Host:
             engine.halt(self._memory.reason)
             self._busy = False
         self._turn.worked(self._busy)
+        if was_busy and not self._busy:
+            self._keeper.has_built()
         if self._busy != was_busy or (self._busy and time.monotonic() >= self._report_due):
             self._report()
 

@@ -31,6 +31,9 @@ _KNOWN: Final[tuple[str, ...]] = ("error_estimate", "unshot_fraction", "progress
 _KNOWN_OF_LINKS: Final[tuple[str, ...]] = ("bound", "norm", "linked")
 """and one that links, besides"""
 
+_KEPT: Final = tuple(field for field in fields(TransportState) if field.init)
+"""Of a state; the rest of it is room to work in"""
+
 Number = float | int | str
 
 
@@ -58,7 +61,7 @@ def checkpoint_of(solver: RadiositySolver | SampledSolver) -> Checkpoint | None:
     numbers["outcome"] = solver.outcome.name
     numbers["closed"] = int(bool(solver.statistics().closed))
     arrays: dict[str, AnyArray] = {}
-    for field in fields(TransportState):
+    for field in _KEPT:
         match getattr(solver.state, field.name):
             case ElementTree() | LinkTable() as table:
                 arrays |= {f"{field.name}.{name}": column.live for name, column in _columns(table).items()}
@@ -70,7 +73,7 @@ def checkpoint_of(solver: RadiositySolver | SampledSolver) -> Checkpoint | None:
                 pass
             case value:
                 raise TypeError(f"{field.name} of a state cannot be kept: it is a {type(value).__name__}")
-    return Checkpoint(_name(solver.surfaces, solver.settings), numbers, arrays)
+    return Checkpoint(name_of_solver(solver), numbers, arrays)
 
 
 def solver_of(
@@ -97,6 +100,11 @@ def solver_of(
     return solver
 
 
+def name_of_solver(solver: RadiositySolver | SampledSolver) -> str:
+    """What a checkpoint of it is named."""
+    return _name(solver.surfaces, solver.settings)
+
+
 def _known(solver: RadiositySolver | SampledSolver) -> tuple[str, ...]:
     return _KNOWN + (_KNOWN_OF_LINKS if isinstance(solver, RadiositySolver) else ())
 
@@ -114,7 +122,7 @@ def _state_of(checkpoint: Checkpoint, surfaces: Surfaces) -> TransportState:
     """The state that was kept. Raises KeyError where something of it is missing."""
     state = TransportState.of(surfaces)
     kept: dict[str, Any] = {}
-    for field in fields(TransportState):
+    for field in _KEPT:
         match getattr(state, field.name):
             case ElementTree() | LinkTable() as table:
                 for name, column in _columns(table).items():

@@ -21,6 +21,7 @@ from solver.document.limits import SceneLimits
 from solver.engine.auto import AutoView, renderers_for
 from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.checkpoint import Checkpoint
+from solver.engine.checkpoint_fine import interpolants_alone
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.exports.files import Export, ExportRequest, encode_export
 from solver.engine.fine import FineLight
@@ -356,8 +357,10 @@ class Engine:
         return camera
 
     def checkpoint(self) -> Checkpoint | None:
-        """The solution as it is to be kept, None while it does not rest; good until the next edit."""
-        return None if self._is_behind else self._solution.checkpoint()
+        """The solution as it is to be kept, and what is built on it, if that is complete; None while it does
+        not rest. Good until the next edit."""
+        found = None if self._is_behind else self._solution.checkpoint()
+        return found if found is None or self._fine is None else self._fine.kept(found)
 
     def _settle(
         self, world: World, earlier: Solution | None, drags: bool, kept: Checkpoint | None = None
@@ -367,6 +370,7 @@ class Engine:
         solution = Solution(
             world, self._settings, earlier, self._revision, drags, self._memory, seen is not None, kept
         )
+        self._kept = None if kept is None else interpolants_alone(kept)
         self._seen = None if solution.trace() is None else seen or self._seen
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
@@ -413,7 +417,7 @@ class Engine:
         """Fine light, once the solution rests; a sampled one never has any."""
         rests = self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED)
         if self._fine is None and rests and not self._solution.is_sampled:
-            self._fine = FineLight(self._solution, self._drawing, self._settings, self._seen)
+            self._fine = FineLight(self._solution, self._drawing, self._settings, self._seen, self._kept)
         return self._fine
 
     def _instant_view(self, camera: Camera, request: FrameRequest) -> InstantView:

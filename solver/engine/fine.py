@@ -15,6 +15,8 @@ from typing import Final
 import numpy as np
 
 from solver.engine.cameras import camera_key
+from solver.engine.checkpoint import Checkpoint
+from solver.engine.checkpoint_fine import KeptInterpolants, with_interpolants
 from solver.engine.drawing import Drawing
 from solver.engine.solution import Solution
 from solver.engine.status import FineStatistics
@@ -60,8 +62,10 @@ class FineLight:
         drawing: Drawing,
         settings: LightSettings,
         before: Interpolants | None = None,
+        kept: Checkpoint | None = None,
     ) -> None:
-        """Nothing is built yet; what edits left as it was is taken over from the interpolants `before`.
+        """Nothing is built yet; what edits left as it was is taken over from the interpolants `before`, and
+        what was `kept` with this very solution is gone on from.
 
         Raises ValueError for a sampled solution.
         """
@@ -78,6 +82,7 @@ class FineLight:
         self._cameras: OrderedDict[tuple[float, ...], Camera] = OrderedDict()
         self._seen: dict[tuple[float, ...], FloatArray] = {}
         self._before = before
+        self._kept = KeptInterpolants.of(kept, self._solver, settings)
         self._taken_over = 0
         self._interpolants: Interpolants | None = None
         self._lines: Lines | None = None
@@ -138,6 +143,12 @@ class FineLight:
         """Estimated relative error of point irradiances."""
         return _GATHER_ERROR * self._solution.error_estimate
 
+    def kept(self, checkpoint: Checkpoint) -> Checkpoint:
+        """A checkpoint of the solution, with the interpolants where all that was asked for is built."""
+        if self._interpolants is None or not self._is_resting or self.failure is not None:
+            return checkpoint
+        return with_interpolants(checkpoint, self._interpolants, self._settings)
+
     # --- the work ------------------------------------------------------------------------------------
 
     def prepare(self) -> PointIrradiance | None:
@@ -196,7 +207,8 @@ class FineLight:
         point = self._point = point.of_light(state)
         yield
         field = self._solution.field()
-        cells = Cells.of(field)
+        kept, self._kept = self._kept, None
+        cells = Cells.of(field) if kept is None else kept.cells()
         self._lines = yield from find_lines(state, hierarchy, field, self._settings)
         before, trace = self._before, self._solution.trace()
         triangulation: Triangulation | None = None if before is None else before.triangulation
@@ -213,6 +225,9 @@ class FineLight:
                 doubt = trace.at_leaves(state.tree)
                 self._taken_over = interpolants.follow(before, trace.patch, doubt)
                 self._before = None
+            if kept is not None:
+                kept.restore(interpolants)
+                kept = None
             self._interpolants = interpolants
             self._look(interpolants)
             yield

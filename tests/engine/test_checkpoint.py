@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,12 @@ from solver.engine.checkpoint_file import (
     read_checkpoint,
     write_checkpoint,
 )
+from solver.engine.checkpoint_fine import sample_count, without_interpolants
 from solver.engine.engine import Engine
 from solver.engine.requests import CameraChoice, FrameRequest, RendererName
 from solver.engine.status import SessionState
 from solver.illumination.settings import LightSettings
+from solver.types import AnyArray
 from tests.engine.scenes import box
 
 SETTINGS = LightSettings(error_tolerance=0.05)
@@ -65,6 +68,58 @@ def test_it_rests_at_once_and_shows_the_same(file: Path, renderer: RendererName)
         assert engine.outlook(request).converged
         images.append(engine.frame(request).image)
     np.testing.assert_array_equal(images[0], images[1])
+
+
+def look(engine: Engine, fov: float = 50.0) -> AnyArray:
+    """The frame of a camera once all that it sees is built."""
+    request = FrameRequest(CameraChoice(width=48, height=32, vertical_fov=fov), RendererName.INTERPOLANT)
+    engine.outlook(request)
+    run(engine)
+    assert engine.outlook(request).converged
+    return engine.frame(request).image
+
+
+def test_interpolants_are_kept_with_it(file: Path) -> None:
+    before = settled()
+    first = look(before)
+    checkpoint = kept(before, file)
+    assert sample_count(checkpoint) > 0
+    after = Engine(box(), SETTINGS, kept=checkpoint)
+    np.testing.assert_array_equal(look(after), first)
+    built, anew = after.status().fine, before.status().fine
+    assert (built.triangles, built.interpolants) == (anew.triangles, anew.interpolants)
+    assert built.point_irradiances == 0, "nothing is computed that was"
+    np.testing.assert_array_equal(look(after, 60.0), look(before, 60.0))
+    for engine in (after, before):
+        engine.apply([MOVE])
+        run(engine)
+    np.testing.assert_array_equal(look(after), look(before))
+
+
+def test_the_solution_alone_is_good_too(file: Path) -> None:
+    before = settled()
+    first = look(before)
+    whole = before.checkpoint()
+    assert whole is not None
+    alone = without_interpolants(whole)
+    assert sample_count(alone) == 0
+    assert alone.nbytes < whole.nbytes
+    assert write_checkpoint(alone, file, lambda: True)
+    after = Engine(box(), SETTINGS, kept=read_checkpoint(file))
+    np.testing.assert_array_equal(look(after), first)
+    assert after.status().fine.point_irradiances > 0
+
+
+def test_interpolants_by_other_settings_are_not_gone_on_from(file: Path) -> None:
+    before = settled()
+    look(before)
+    checkpoint = kept(before, file)
+    after = Engine(box(), SETTINGS, kept=checkpoint)
+    after.configure(replace(SETTINGS, interpolation_error=0.3))
+    anew = settled()
+    anew.configure(replace(SETTINGS, interpolation_error=0.3))
+    np.testing.assert_array_equal(look(after), look(anew))
+    assert after.status().fine.point_irradiances > 0
 
 
 def test_edits_go_on_from_it(file: Path) -> None:
