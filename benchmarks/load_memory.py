@@ -20,7 +20,10 @@ _ENOUGH: Final = 6
 
 @dataclass(frozen=True)
 class Memory:
-    """MB of the processes of a service, what they share counted in equal parts."""
+    """MB of the processes of a service, what they share counted in equal parts.
+
+    Files that they map are left out: they share those with whatever else runs, which comes and goes.
+    """
 
     seconds: float
     """By the monotonic clock"""
@@ -109,5 +112,6 @@ def _shared_out_of(process: int) -> float:
         told = Path(f"/proc/{process}/smaps_rollup").read_text()
     except (FileNotFoundError, ProcessLookupError):
         return 0.0
-    found = re.search(r"^Pss:\s+(\d+) kB", told, re.MULTILINE)
-    return 0.0 if found is None else 1.024e-3 * int(found[1])
+    return sum(
+        1.024e-3 * int(kb) for kb in re.findall(r"^Pss_(?:Anon|Shmem):\s+(\d+) kB", told, re.MULTILINE)
+    )
