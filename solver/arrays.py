@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T", bound=np.generic)
+
+_LITTLE: Final = 64
+"""Part of the rows that are worth copying them"""
 
 
 class GrowingArray(Generic[T]):
@@ -16,6 +19,14 @@ class GrowingArray(Generic[T]):
     def __init__(self, shape: tuple[int, ...], dtype: type[T], capacity: int = 256) -> None:
         self._data: NDArray[T] = np.zeros((capacity, *shape), dtype=dtype)
         self._size = 0
+
+    @staticmethod
+    def of(rows: NDArray[T]) -> GrowingArray[T]:
+        """A copy of `rows`, with room for an eighth more."""
+        array = GrowingArray(rows.shape[1:], rows.dtype.type, 0)
+        array._data = np.empty((len(rows) + len(rows) // 8, *rows.shape[1:]), rows.dtype)
+        array.append(rows)
+        return array
 
     def __len__(self) -> int:
         return self._size
@@ -51,9 +62,12 @@ class GrowingArray(Generic[T]):
         self._size = min(self._size, count)
 
     def trim(self, spare: float = 0.0625) -> None:
-        """Give capacity back beyond what a few more rows will need: `spare` of those that there are."""
+        """Give capacity back beyond what a few more rows will need: `spare` of those that there are.
+
+        It is left where it is not much more, since all rows are copied.
+        """
         enough = self._size + int(spare * self._size)
-        if enough < len(self._data):
+        if enough + enough // _LITTLE < len(self._data):
             kept: NDArray[T] = np.empty((enough, *self._data.shape[1:]), self._data.dtype)
             kept[: self._size] = self.live
             self._data = kept

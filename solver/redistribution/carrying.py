@@ -7,12 +7,16 @@ takes the light with it that it had sent: its links shoot their energy once more
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
 from solver.redistribution.matching import Match
+from solver.transport.closure import of_patches
 from solver.transport.elements import ElementTree
+from solver.transport.links import LinkTable
 from solver.transport.pushpull import gather, means, pull
 from solver.transport.state import TransportState, ambient, shine_of
 from solver.types import FloatArray, IntArray
@@ -94,6 +98,8 @@ def carry(
     if known.any():
         before = _in_channels(state, means(state.tree, state.received), channels)
         after.received[fresh[known], 0] = before[match.likeness[fresh[known]]]
+        # What has moved sees about as much too much of itself as before.
+        after.closure[fresh[known]] = of_patches(state.tree, state.closure)[match.likeness[fresh[known]]]
     after.radiosity[fresh, 0] = after.emission[fresh] + after.reflectance[fresh] * after.received[fresh, 0]
     source[fresh] = -1
     return Carried(after, source, dimmed)
@@ -127,16 +133,40 @@ def _carry_in_place(
         state.add_received(lost, -1.0)
     state.links.remove(removed)
     tree.move(surfaces, fresh)
-    state.closure[fresh] = 1.0
     for functions in (state.radiosity, state.received, state.remainder):
         functions[fresh] = 0.0
     state.received[fresh, 0] = guess
     state.radiosity[fresh, 0] = state.emission[fresh] + state.reflectance[fresh] * guess
     if moments is not None:
-        moments[fresh] = state.radiosity[fresh]
+        moments[fresh] = state.radiosity[fresh] * state.closure[fresh, None, None]
     source = np.arange(len(tree), dtype=np.int32)
     source[fresh] = -1
     return Carried(replace(state, surfaces=surfaces), source, dimmed, moments)
+
+
+class Shots(NamedTuple):
+    """What k links do to the light at their ends, both ways."""
+
+    p: IntArray
+    q: IntArray
+    exchange: FloatArray
+    """(k,) m2, visibility included"""
+    slope_p: FloatArray
+    slope_q: FloatArray
+
+    @staticmethod
+    def of(links: LinkTable, rows: IntArray) -> Shots:
+        """What links `rows` (k,) do."""
+        exchange = links.open_exchange[rows] * links.visibility[rows]
+        return Shots(links.p[rows], links.q[rows], exchange, links.slope_p[rows], links.slope_q[rows])
+
+    def taken_back(self) -> Shots:
+        """The same with negative energy."""
+        return self._replace(exchange=-self.exchange, slope_p=-self.slope_p, slope_q=-self.slope_q)
+
+    def shoot(self, area: FloatArray, moments: FloatArray, arrived: FloatArray) -> None:
+        """Add to the irradiance functions `arrived` (n, 3, channels) what `moments` (n, 3, channels) send."""
+        gather(*self, area, moments, 0, len(self.p), arrived)
 
 
 def sent_over(state: TransportState, rows: IntArray, moments: FloatArray | None = None) -> FloatArray:
@@ -146,12 +176,8 @@ def sent_over(state: TransportState, rows: IntArray, moments: FloatArray | None 
     """
     arrived = np.zeros_like(state.received)
     if len(rows):
-        links = state.links
-        exchange = links.open_exchange[rows] * links.visibility[rows]
-        gather(
-            links.p[rows], links.q[rows], exchange, links.slope_p[rows], links.slope_q[rows],
-            state.tree.area, moments_of(state) if moments is None else moments, 0, len(rows), arrived,
-        )  # fmt: skip
+        known = moments_of(state) if moments is None else moments
+        Shots.of(state.links, rows).shoot(state.tree.area, known, arrived)
     return arrived
 
 
@@ -164,15 +190,14 @@ def moments_of(state: TransportState) -> FloatArray:
     return moments
 
 
-def moments_of_more(state: TransportState, known: FloatArray) -> FloatArray:
-    """The same, where those of the first elements are `known` (m, 3, channels), and the rest are leaves."""
-    tree, first = state.tree, len(known)
+def add_moments(state: TransportState, moments: GrowingArray[np.float64]) -> None:
+    """Add to `moments` (m, 3, channels), those of the first elements, those of the rest, which are leaves."""
+    tree, first = state.tree, len(moments)
     count = len(tree) - first
-    fresh = state.radiosity[first:] * state.closure[first:, None, None]
-    moments = np.empty_like(fresh)
+    sent = state.radiosity[first:] * state.closure[first:, None, None]
+    fresh = moments.grow(count)
     leaves, none = np.full(count, -1, dtype=np.int32), np.zeros(count, dtype=np.int32)
-    pull(leaves, none, tree.area[first:], tree.moment[first:], tree.offset[first:], fresh, moments)
-    return np.concatenate([known, moments])
+    pull(leaves, none, tree.area[first:], tree.moment[first:], tree.offset[first:], sent, fresh)
 
 
 def _repaint(before: TransportState, after: TransportState, match: Match) -> None:

@@ -19,9 +19,10 @@ from typing import Final
 import numpy as np
 
 from solver import tolerances
+from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
 from solver.parallel import run_chunks
-from solver.redistribution.carrying import carry, moments_of, moments_of_more, sent_over
+from solver.redistribution.carrying import Shots, add_moments, carry, moments_of
 from solver.redistribution.debts import UnlinkedPairs, owe
 from solver.redistribution.energy import doubt_of, rank_links, unshot_square
 from solver.redistribution.marks import Marks
@@ -34,7 +35,7 @@ from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.pace import steps
-from solver.transport.pushpull import gather, means
+from solver.transport.pushpull import means
 from solver.transport.refine import NOISE_SHARE, Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -168,7 +169,7 @@ class Redistribution(RadiositySolver):
         self._guessed = 1.0
         """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
         self._guessed_now = 1.0
-        self._arrived: FloatArray | None = None
+        self._arrived: GrowingArray[np.float64] | None = None
         self._waits = False
         """Whether something has arrived that elements have not received yet"""
         self._plan: _Plan | None = None
@@ -256,7 +257,7 @@ class Redistribution(RadiositySolver):
         plan, state = self._plan, self._state
         assert plan is not None
         moments = self._known_moments()
-        self._arrived = np.zeros_like(state.received)
+        self._arrived = self._nothing()
         coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         since, before = 0, self._paid
         for batch in self.pace.batches(np.ones(len(plan.energy) - before, dtype=np.int64)):
@@ -357,30 +358,31 @@ class Redistribution(RadiositySolver):
         What a link brings otherwise once it is refined is shot at once.
         """
         state = self._state
-        residuals, moments = Residuals.of(state), self._known_moments()
-        self._moments = None
+        residuals, moments = Residuals.of(state), GrowingArray.of(self._known_moments())
+        self._moments, self._arrived = None, self._nothing()
         rows = self._new.rows()
         yield True
         while True:
-            estimate = residuals.estimate(state, state.links.take(rows))
-            choice = choose_above(state, rows, estimate, self.settings, bound)
+            choice = choose_above(state, rows, residuals.estimate(state, rows), self.settings, bound)
             yield True
             if not isinstance(choice, Choice):
                 break
-            lost, before = sent_over(state, choice.links, moments), len(state.links)
+            before, worse = len(state.links), Shots.of(state.links, choice.links).taken_back()
             rows = yield from self._refine(residuals.light, choice)
             moved = moved_rows(choice.links, len(rows), before)
             for marks in (self._new, self._faded):
                 marks.replace(choice.links, moved, len(state.links))
             self._new.mark(rows)
             rows.sort()
-            moments = moments_of_more(state, moments)
-            brought = sent_over(state, rows, moments)
-            brought[: len(lost)] -= lost
-            state.add_received(brought)
+            add_moments(state, moments)
+            self._arrived.grow(len(state.tree) - len(self._arrived))
+            for shots in (worse, Shots.of(state.links, rows)):
+                shots.shoot(state.tree.area, moments.live, self._arrived.live)
+            self._waits = True
             self.version += 1
             residuals = residuals.grown(state, rows)
-        self._moments = moments
+        self._take_in()
+        self._moments, self._arrived = moments.live, None
         self._spread_guess()
 
     def _refine_beyond(self) -> Iterator[bool]:
@@ -485,17 +487,21 @@ class Redistribution(RadiositySolver):
         to_q = exchange / area[batch.q] * (moments[batch.p, 0] @ weights)
         self.trace.disturb(batch.p, batch.q, to_p, to_q)
         self._ray_count += STRATA * int(batch.samples.sum())
-        gather(
-            batch.p, batch.q, exchange, slope_p, slope_q, self._state.tree.area, moments, 0, len(batch.p),
-            self._arrived,
-        )  # fmt: skip
+        shots = Shots(batch.p, batch.q, exchange, slope_p, slope_q)
+        shots.shoot(area, moments, self._arrived.live)
         self._waits = True
+
+    def _nothing(self) -> GrowingArray[np.float64]:
+        """Irradiance functions for what will arrive."""
+        return GrowingArray.of(np.zeros_like(self._state.received))
 
     def _take_in(self) -> None:
         """Add what has arrived to what elements have received."""
         if self._arrived is not None and self._waits:
-            self._state.add_received(self._arrived)
-            self._arrived[...] = 0.0
+            # Elements may have been divided since.
+            self._arrived.grow(len(self._state.tree) - len(self._arrived))
+            self._state.add_received(self._arrived.live)
+            self._arrived.live[...] = 0.0
             self._waits = False
         if self._guessed != self._guessed_now:
             self._state.received[self._guesses, 0] -= (self._guessed - self._guessed_now) * self._guess

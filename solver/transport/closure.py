@@ -5,7 +5,8 @@ of parts in a thousand, which reflectances near 1 would amplify a hundredfold. T
 is the lack of a gradient in a uniform field, by coupling each leaf with itself. Scaling its links instead
 would let those that carry no light, and may be coarse, change those that carry all of it. In an open scene
 the row sums are what they are, but for patches where they are above 1 on average: these are scaled down,
-G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity. Whether a scene is closed is asked of
+G'_ij = d_i d_j G_ij (Sinkhorn's iteration), which keeps reciprocity. It goes on from the scales that were
+there before, since few links change at a time. Whether a scene is closed is asked of
 rays: if `PROBES` cosine-distributed rays, spread over the surfaces by area, all
 end on fronts, at most about 3 / PROBES of the light can escape unseen (95 % confidence).
 """
@@ -20,13 +21,14 @@ import numpy as np
 
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
+from solver.transport.elements import ElementTree
 from solver.transport.state import TransportState
-from solver.types import FloatArray, Int64Array
+from solver.types import BoolArray, FloatArray, Int64Array
 from solver.visibility.rays import RayScene
 
 PROBES: Final = 16384
 _STEPS: Final = 5
-"""At most, in an open scene; each halves what a patch has too much, where others have too little"""
+"""At most, in an open scene; another balance goes on from there"""
 _EXCESS: Final = 1e-3
 """Of the sum of a patch, that is left alone"""
 _MOST_REFLECTED: Final = 0.995
@@ -82,31 +84,67 @@ def balance(state: TransportState, closed: bool, strict: bool = False) -> Iterat
     In an open scene: of every patch on average; `strict`: of every leaf, so that light cannot multiply
     anywhere, at the price of what leaves with too great a sum receive rightly.
     """
-    tree = state.tree
-    n = len(tree)
-    leaf = tree.child < 0
-    state.closure = np.ones(n)
-    state.remainder = np.zeros((n, 3))
-    unit = np.zeros((n, 3, 1))
-    unit[:, 0] = 1.0
-    highest = state.reflectance.max(axis=1)[tree.patch]
-    for _ in range(0 if closed else _STEPS):
-        row_sum = (yield from state.gather_in_steps(unit))[:, 0, 0]
-        yield
-        if strict:
-            target = np.where(
-                leaf, np.minimum(row_sum, _MOST_REFLECTED / np.maximum(highest, 1e-300)), row_sum
-            )
-        else:
-            total = np.bincount(tree.patch[leaf], tree.area[leaf] * row_sum[leaf], tree.patch_count)
-            of_patch = total / tree.area[: tree.patch_count]
-            target = np.where(leaf, row_sum / np.maximum(of_patch, 1.0)[tree.patch], row_sum)
-        off = target != row_sum
-        if not (row_sum > (1.0 + _EXCESS) * target).any():
-            return
-        state.closure[off] *= np.sqrt(target[off] / row_sum[off])
+    n = len(state.tree)
+    leaf = state.tree.child < 0
+    before = state.closure
+    state.closure, state.remainder = np.ones(n), np.zeros((n, 3))
     if closed:
-        rows = (yield from state.gather_in_steps(unit))[:, :, 0]
+        rows = (yield from state.gather_in_steps(_uniform(n)))[:, :, 0]
         state.remainder[leaf] = -rows[leaf]
         state.remainder[leaf, 0] += 1.0
         yield
+    elif strict:
+        yield from _balance_leaves(state, leaf)
+    else:
+        yield from _balance_patches(state, leaf, before)
+
+
+def _balance_patches(state: TransportState, leaf: BoolArray, before: FloatArray) -> Iterator[None]:
+    """Scale patches down, and up again where they need it no more, from where they were `before` (n,)."""
+    patch = state.tree.patch[leaf]
+    scale = np.minimum(of_patches(state.tree, before), 1.0)
+    slope = np.full(len(scale), 1.5)
+    step, excess = np.zeros((2, len(scale)))
+    for _ in range(_STEPS):
+        state.closure[leaf] = scale[patch]
+        found = yield from state.gather_in_steps(_uniform(len(leaf)))
+        row_sum = of_patches(state.tree, found[:, 0, 0])
+        yield
+        if not np.any((row_sum > 1.0 + _EXCESS) | ((scale < 1.0) & (row_sum < 1.0 - _EXCESS))):
+            return
+        # A sum goes down as the scale, or as its square, or by what lies between: by how many of those that
+        # the patch sees are scaled too. One step tells.
+        was, excess = excess, np.log(np.maximum(row_sum, 1e-300))
+        moved = step > 0.0
+        slope[moved] = np.clip((was - excess)[moved] / step[moved], 1.0, 2.0)
+        scaled = np.minimum(scale * np.exp(-excess / slope), 1.0)
+        step, scale = np.log(scale / scaled), scaled
+    state.closure[leaf] = scale[patch]
+
+
+def of_patches(tree: ElementTree, values: FloatArray) -> FloatArray:
+    """Means (p,) over the patches of values (n,) of their leaves."""
+    leaf = tree.child < 0
+    total = np.bincount(tree.patch[leaf], tree.area[leaf] * values[leaf], tree.patch_count)
+    return np.asarray(total / tree.area[: tree.patch_count])
+
+
+def _balance_leaves(state: TransportState, leaf: BoolArray) -> Iterator[None]:
+    tree = state.tree
+    highest = state.reflectance.max(axis=1)[tree.patch]
+    for _ in range(_STEPS):
+        row_sum = (yield from state.gather_in_steps(_uniform(len(tree))))[:, 0, 0]
+        yield
+        most = _MOST_REFLECTED / np.maximum(highest, 1e-300)
+        target = np.where(leaf, np.minimum(row_sum, most), row_sum)
+        if not (row_sum > (1.0 + _EXCESS) * target).any():
+            return
+        off = target != row_sum
+        state.closure[off] *= np.sqrt(target[off] / row_sum[off])
+
+
+def _uniform(count: int) -> FloatArray:
+    """Functions (count, 3, 1) of 1 everywhere."""
+    unit = np.zeros((count, 3, 1))
+    unit[:, 0] = 1.0
+    return unit

@@ -48,7 +48,7 @@ def coarsen(
     tried[merging] = False
     while True:
         candidates = rows[~tried[rows]]
-        errors = residuals.estimate(state, links.take(candidates)).links.sum(axis=0)
+        errors = residuals.estimate(state, candidates).links.sum(axis=0)
         group, ends = _families(tree, links, candidates, errors, _SMOOTHER * bound)
         yield
         if len(ends) == 0:

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.parallel import run_chunks
 from solver.transport.linking import Light
-from solver.transport.links import LinkBatch, LinkTable
+from solver.transport.links import LinkBatch
 from solver.transport.oracle import (
     RESAMPLE,
     SPLIT_P,
@@ -134,21 +134,22 @@ class Residuals:
             np.concatenate([self.bias, self.bias[parent]]),
         )
 
-    def estimate(self, state: TransportState, links: LinkTable | LinkBatch | None = None) -> ErrorEstimate:
-        """The errors of the given links (n,), without the norm, or of all that there are, with it.
+    def estimate(self, state: TransportState, links: LinkBatch | IntArray | None = None) -> ErrorEstimate:
+        """The errors of the given links or rows of links (n,), without the norm, or of all, with it.
 
         Emission is known and would only dilute a relative error, so that the norm leaves it out.
         """
         tree, norm = state.tree, math.nan
         leaf = tree.child < 0
         if links is None:
-            links = state.links
             reflected = state.radiosity[leaf, 0] @ state.weights
             reflected -= (state.emission @ state.weights)[tree.patch[leaf]]
             norm = float((tree.area[leaf] * reflected**2).sum())
         resolved = np.where(leaf, LEAF, 1.0)
-        p, q, exchange, noise = links.p, links.q, links.open_exchange, links.noise
-        residual_p, residual_q = links.residual_p, links.residual_q
+        told = links if isinstance(links, LinkBatch) else state.links
+        rows = links if isinstance(links, np.ndarray) else slice(None)
+        p, q, exchange, noise = told.p[rows], told.q[rows], told.open_exchange[rows], told.noise[rows]
+        residual_p, residual_q = told.residual_p[rows], told.residual_q[rows]
         errors = np.empty((3, len(p)))
         mean, reflectance = self.light.radiosity, self.light.reflectance
 

@@ -21,7 +21,7 @@ from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 _POOLED: Final = 1 << 21
 """Entries of blocker lists copied between two yields."""
 
-_TRIM: Final = 1.0625
+_TRIM: Final = 1.125
 """Entries of blocker lists that may be kept of those that are needed, when all else is given back"""
 
 _SPARE: Final = 0.25

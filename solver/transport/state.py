@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -41,6 +41,8 @@ class TransportState:
     gathers: int = 0
     loss: float = 1.0
     """Least share of any light that one reflection takes away, as far as settling has found out"""
+    _rooms: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    """Arrays of which some of these are the first rows"""
 
     @staticmethod
     def of(surfaces: Surfaces) -> TransportState:
@@ -101,12 +103,22 @@ class TransportState:
         parent = self.tree.parent[before:]
         offset = self.tree.offset[before:]
         for name in ("radiosity", "received"):
-            functions: FloatArray = getattr(self, name)
-            fresh = functions[parent]
+            fresh = getattr(self, name)[parent]
             fresh[:, 0] += np.einsum("nk,nkc->nc", offset, fresh[:, 1:])
-            setattr(self, name, np.concatenate([functions, fresh]))
-        self.closure = np.concatenate([self.closure, self.closure[parent]])
-        self.remainder = np.concatenate([self.remainder, np.zeros((len(parent), 3))])
+            self._append(name, fresh)
+        self._append("closure", self.closure[parent])
+        self._append("remainder", np.zeros((len(parent), 3)))
+
+    def _append(self, name: str, rows: FloatArray) -> None:
+        """Let rows follow those of an array, in the same place where there is room behind them."""
+        known: FloatArray = getattr(self, name)
+        count = len(known) + len(rows)
+        room = self._rooms.get(name, known)
+        if known.base is not room or len(room) < count:
+            room = self._rooms[name] = np.empty((count + count // 8, *known.shape[1:]))
+            room[: len(known)] = known
+        room[len(known) : count] = rows
+        setattr(self, name, room[:count])
 
     def fold(self, gone: BoolArray) -> None:
         """Let elements (n,) go that have no links; parents whose children go have the light of those."""
@@ -114,12 +126,12 @@ class TransportState:
         for name in ("radiosity", "received"):
             functions: FloatArray = getattr(self, name)
             functions[heads] = linear_functions(self.tree, functions, heads)
+        self.closure[heads] = self.closure[self.tree.child[heads]]
         self.tree, number = self.tree.without(gone)
         kept = np.flatnonzero(number >= 0)
         for name in ("radiosity", "received", "closure", "remainder"):
             setattr(self, name, getattr(self, name)[kept])
         self.remainder[number[heads]] = 0.0
-        self.closure[number[heads]] = 1.0
         self.links.renumber(number, np.arange(self.tree.patch_count, dtype=np.int32))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from solver.engine.world import World
 from solver.geometry.scene import Mesh, SceneObject
-from solver.transport.closure import is_closed
+from solver.transport.closure import balance, is_closed
 from solver.transport.field import SolveOutcome
 from tests.pathtracing.worlds import CUBE, INWARD, OUTWARD, material, polygon, world
 from tests.transport.solving import (
@@ -79,13 +79,36 @@ def test_rows_of_an_open_scene_are_those_of_its_links() -> None:
     assert raw_rows(solver).max() < 1.05
 
 
+def nearly_closed() -> World:
+    """The white unit cube with a block in it and a slit in its roof: row sums err above 1."""
+    faces = [SceneObject(f"face{k}", Mesh(CUBE, (f,)), material(0.999)) for k, f in enumerate(INWARD)]
+    lid = SceneObject("lid", Mesh(CUBE * [1 - 1e-3, 1, 1], (INWARD[1],)), material(0.999, 1.0))
+    block = SceneObject("block", Mesh(0.3 + 0.3 * CUBE, OUTWARD), material(0.999))
+    return world(faces[0], *faces[2:], lid, block)
+
+
+@pytest.mark.parametrize("before", [1.0, 0.7, "balanced"])
+def test_balance_goes_on_from_anywhere_and_comes_to_the_same(before: float | str) -> None:
+    state = state_of(solved(nearly_closed(), 0.2))
+    for _ in range(3):
+        for _ in balance(state, closed=False):
+            pass
+    known, gathers = state.closure.copy(), state.gathers
+    assert known.min() < 0.999
+    if isinstance(before, float):
+        state.closure = np.full(len(known), before)
+    for _ in range(3):
+        for _ in balance(state, closed=False):
+            pass
+    np.testing.assert_allclose(state.closure, known, rtol=2e-3)
+    if before == "balanced":
+        np.testing.assert_array_equal(state.closure, known)
+        assert state.gathers == gathers + 3, "to see that all is well takes one"
+
+
 def test_open_scenes_do_not_multiply_light() -> None:
     """Row sums that err above 1 times a reflectance of nearly 1 would."""
-    faces = [SceneObject(f"face{k}", Mesh(CUBE, (f,)), material(0.999)) for k, f in enumerate(INWARD)]
-    gap = 1e-3
-    lid = SceneObject("lid", Mesh(CUBE * [1 - gap, 1, 1], (INWARD[1],)), material(0.999, 1.0))
-    block = SceneObject("block", Mesh(0.3 + 0.3 * CUBE, OUTWARD), material(0.999))
-    solver = solved(world(faces[0], *faces[2:], lid, block), 0.2)
+    solver = solved(nearly_closed(), 0.2)
     state = state_of(solver)
     one = np.zeros((len(state.tree), 3, 1))
     one[:, 0] = 1.0
