@@ -156,11 +156,15 @@ def test_drags_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(table.rows) == 1
     assert len(table.rows[0].cells) == len(table.columns)
     assert [target.what for target in table.targets] == ["first frame", "shadow", "dragged"]
+    assert drags.tabulate([replace(figures, elements=40_000)]).targets == (), "those of a coarser mesh"
 
 
 def test_sections_hold_the_scenes_that_are_edited() -> None:
     whole, quick = Options(), Options(("cornell", "cube_room"), quick=True)
     assert [job.label for job in edits.section(whole).jobs] == ["cube_room", "robot_cell"]
     assert [job.label for job in edits.section(quick).jobs] == ["cube_room"]
-    assert len(drags.section(whole).jobs) == 3
-    assert len(drags.section(quick).jobs) == 1
+    assert len(drags.section(whole).jobs) == 6, "three edits at two tolerances"
+    assert [job.label for job in drags.section(quick).jobs] == [
+        "cube_room, move cube by 0.5 m, 4.0 %",
+        "cube_room, move cube by 0.5 m, 2.0 %",
+    ]
