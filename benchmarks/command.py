@@ -44,7 +44,7 @@ def bench(
     ] = "report",
     full: Annotated[
         bool,
-        typer.Option("--full", help=f"All settings and sizes, {_QUICK_LEAVES_OUT} too: some 25 minutes."),
+        typer.Option("--full", help=f"All settings and sizes, {_QUICK_LEAVES_OUT} too: over an hour."),
     ] = False,
     out: Annotated[
         Path,
