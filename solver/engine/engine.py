@@ -125,9 +125,9 @@ class Engine:
         self._is_behind = False
         """Whether the solution is that of an earlier world"""
         self._halted: str | None = None
+        """What to tell where no work is done until the next change"""
         self._is_outgrown = False
         """Whether what the solution was halted for is still held by it"""
-        """What to tell where no work is done until the next change"""
         self._power: dict[ObjectId, float] = {}
         """W of luminance that left each object before the last transition that goes on with no drag"""
         self._settle(World.of(standing, in_colour=_in_colour(self._settings)), None, False, kept)

@@ -59,7 +59,7 @@ class Frame:
     """(height, width, ...), top row first; what a pixel holds is the layer's."""
     outlook: Outlook
     seconds: float
-    """What drawing it took"""
+    """Until it was drawn, with what was done meanwhile"""
 
 
 class View(Protocol):

@@ -304,13 +304,6 @@ class LinkTable:
         """Take out the rows `gone` (n,), ascending. The last ones fill their places."""
         self._fill(gone)
 
-    def take(self, rows: IntArray) -> LinkBatch:
-        """Copies of `rows` (n,)."""
-        return LinkBatch(
-            **{name: getattr(self, name)[rows] for name in _COLUMNS},
-            blockers=take_ranges(self.pool, self.blocker_start[rows], self.blocker_count[rows]),
-        )
-
     def copy(self) -> LinkTable:
         """The same links in arrays of their own."""
         return finish(self.copy_in_steps())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -83,7 +85,9 @@ def rows_at(table: LinkTable, row: int) -> tuple[object, ...]:
 
 
 def rows_of(table: LinkTable, which: IntArray) -> list[tuple[object, ...]]:
-    return rows(table.take(which))
+    columns = {f.name: getattr(table, f.name)[which] for f in fields(LinkBatch) if f.name != "blockers"}
+    blockers = take_ranges(table.pool, table.blocker_start[which], table.blocker_count[which])
+    return rows(LinkBatch(**columns, blockers=blockers))
 
 
 @given(seed=st.integers(0, 1 << 30), count=st.integers(1, 400))
