@@ -72,7 +72,14 @@ def plot(found: list[Any], directory: Path) -> None:
         for number, name in enumerate(told_by):
             cases = [case for case in every if case.told_by is name]
             true = [max(case.true, _LEAST_SHOWN) for case in cases]
-            cell.plot(true, [case.told for case in cases], f"C{number}.", markersize=4, label=str(name))
+            cell.plot(
+                true,
+                [case.told for case in cases],
+                f"C{number}.",
+                markersize=4,
+                label=str(name),
+                rasterized=True,
+            )
         ends = np.array([_LEAST_SHOWN, 1.0])
         cell.plot(ends, ends, "k-", linewidth=0.8)
         cell.plot(ends, _MOST * ends, "k:", linewidth=0.8)
