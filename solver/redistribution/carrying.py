@@ -183,10 +183,11 @@ def sent_over(state: TransportState, rows: IntArray, moments: FloatArray | None 
 
 def moments_of(state: TransportState) -> FloatArray:
     """Means and first moments (n, 3, channels) of what all elements send."""
-    tree = state.tree
-    sent = state.radiosity * state.closure[:, None, None]
-    moments = np.empty_like(sent)
-    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, sent, moments)
+    tree, moments = state.tree, np.empty_like(state.radiosity)
+    pull(
+        tree.child, tree.child_count, tree.area, tree.moment, tree.offset, state.radiosity, moments,
+        state.closure,
+    )  # fmt: skip
     return moments
 
 
@@ -194,10 +195,12 @@ def add_moments(state: TransportState, moments: GrowingArray[np.float64]) -> Non
     """Add to `moments` (m, 3, channels), those of the first elements, those of the rest, which are leaves."""
     tree, first = state.tree, len(moments)
     count = len(tree) - first
-    sent = state.radiosity[first:] * state.closure[first:, None, None]
     fresh = moments.grow(count)
     leaves, none = np.full(count, -1, dtype=np.int32), np.zeros(count, dtype=np.int32)
-    pull(leaves, none, tree.area[first:], tree.moment[first:], tree.offset[first:], sent, fresh)
+    pull(
+        leaves, none, tree.area[first:], tree.moment[first:], tree.offset[first:], state.radiosity[first:],
+        fresh, state.closure[first:],
+    )  # fmt: skip
 
 
 def _repaint(before: TransportState, after: TransportState, match: Match) -> None:
@@ -208,8 +211,9 @@ def _repaint(before: TransportState, after: TransportState, match: Match) -> Non
     changed = np.zeros(new.patch_count, dtype=np.bool_)
     changed[now] = np.any(old.emission[stays] != new.emission[now], axis=1)
     changed[now] |= np.any(old.reflectance[stays] != new.reflectance[now], axis=1)
-    rows = np.flatnonzero(changed[after.tree.patch])
-    after.radiosity[rows] = after.answering()[rows]
+    if changed.any():
+        rows = np.flatnonzero(changed[after.tree.patch])
+        after.radiosity[rows] = after.answering()[rows]
 
 
 def _in_channels(state: TransportState, values: FloatArray, channels: int) -> FloatArray:

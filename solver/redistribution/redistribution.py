@@ -446,9 +446,8 @@ class Redistribution(RadiositySolver):
         if len(rows) == 0:
             return rows
         links = self._state.links
-        told = np.abs(links.debt[rows]) == self._number
         renewed = self._linker.renew(
-            self._state.tree, links, rows, self.recent, self._near, light, self._boxes, told, doubt > 0.0
+            self._state.tree, links, rows, self.recent, self._near, light, doubt > 0.0
         )
         links.noise[rows[renewed.left]] += doubt[renewed.left]
         links.relist(renewed.relisted, renewed.blocker_count, renewed.blockers)

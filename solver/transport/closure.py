@@ -22,6 +22,7 @@ import numpy as np
 from solver import tolerances
 from solver.geometry.surfaces import Surfaces
 from solver.transport.elements import ElementTree
+from solver.transport.pushpull import patch_sums
 from solver.transport.state import TransportState
 from solver.types import BoolArray, FloatArray, Int64Array
 from solver.visibility.rays import RayScene
@@ -106,12 +107,10 @@ def _balance_patches(state: TransportState, leaf: BoolArray, before: FloatArray)
     slope = np.full(len(scale), 1.5)
     step, excess = np.zeros((2, len(scale)))
     for _ in range(_STEPS):
-        state.closure[leaf] = scale[patch]
-        found = yield from state.gather_in_steps(_uniform(len(leaf)))
-        row_sum = of_patches(state.tree, found[:, 0, 0])
+        row_sum = patch_sums(state.tree, state.links, scale)
         yield
         if not np.any((row_sum > 1.0 + _EXCESS) | ((scale < 1.0) & (row_sum < 1.0 - _EXCESS))):
-            return
+            break
         # A sum goes down as the scale, or as its square, or by what lies between: by how many of those that
         # the patch sees are scaled too. One step tells.
         was, excess = excess, np.log(np.maximum(row_sum, 1e-300))

@@ -98,18 +98,14 @@ class Residuals:
         )
         mean = np.maximum(moments[:, 0, 0], 0.0)
         reflectance = (state.reflectance @ state.weights)[tree.patch]
-        amplitude, variance, spread, bias = np.empty((4, len(tree)))
-        arriving_amplitudes(
-            links.p, links.q, links.residual_p, links.residual_q, reflectance, mean, amplitude
-        )
+        variance, spread = np.empty((2, len(tree)))
+        ends = links.p, links.q, links.residual_p, links.residual_q
+        amplitude = arriving_amplitudes(*ends, reflectance, mean)
         leaf_residuals(tree.parent, tree.area, amplitude, variance)
         element_residuals(
             tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
         )
-        leaving_bias(
-            links.p, links.q, links.residual_p, links.residual_q, tree.parent, tree.child, tree.child_count,
-            tree.area, reflectance, spread, bias,
-        )  # fmt: skip
+        bias = leaving_bias(*ends, tree, reflectance, spread)
         return Residuals(Light(mean, reflectance, 0.0), spread, amplitude, bias)
 
     def grown(self, state: TransportState, fresh: IntArray) -> Residuals:
@@ -120,13 +116,16 @@ class Residuals:
         tree, links = state.tree, state.links
         n = len(self.spread)
         parent = tree.parent[n:]
-        arriving = np.zeros(len(tree))
         reflectance = np.concatenate([self.light.reflectance, self.light.reflectance[parent]])
         mean = np.concatenate([self.light.radiosity, np.maximum(state.radiosity[n:, 0] @ state.weights, 0.0)])
-        arriving_amplitudes(
-            links.p[fresh], links.q[fresh], links.residual_p[fresh], links.residual_q[fresh], reflectance,
-            mean, arriving,
-        )  # fmt: skip
+        arriving = arriving_amplitudes(
+            links.p[fresh],
+            links.q[fresh],
+            links.residual_p[fresh],
+            links.residual_q[fresh],
+            reflectance,
+            mean,
+        )
         return Residuals(
             Light(mean, reflectance, 0.0),
             np.concatenate([self.spread, self.spread[parent]]),
@@ -150,23 +149,18 @@ class Residuals:
         rows = links if isinstance(links, np.ndarray) else slice(None)
         p, q, exchange, noise = told.p[rows], told.q[rows], told.open_exchange[rows], told.noise[rows]
         residual_p, residual_q = told.residual_p[rows], told.residual_q[rows]
-        errors = np.empty((3, len(p)))
+        errors, irradiance = np.empty((3, len(p))), np.empty(len(p))
         mean, reflectance = self.light.radiosity, self.light.reflectance
 
         def work(start: int, stop: int) -> None:
             link_errors(
                 p, q, exchange, noise, residual_p, residual_q, tree.area, reflectance, mean, self.spread,
                 resolved, self.amplitude, self.bias, start, stop, errors[SPLIT_P], errors[SPLIT_Q],
-                errors[RESAMPLE],
+                errors[RESAMPLE], irradiance,
             )  # fmt: skip
 
         run_chunks(work, len(p), 1 << 15, 1 << 12)
-        return ErrorEstimate(
-            links=errors,
-            irradiance=np.maximum(mean[q] * residual_p, mean[p] * residual_q),
-            light=self.light,
-            norm=norm,
-        )
+        return ErrorEstimate(links=errors, irradiance=irradiance, light=self.light, norm=norm)
 
 
 def estimate_error(state: TransportState) -> ErrorEstimate:

@@ -23,7 +23,7 @@ from solver.transport.settings import Saving
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
-from solver.visibility.fraction import rays_through, visible_fractions
+from solver.visibility.fraction import visible_fractions
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import NONE, PARTIAL
 
@@ -160,16 +160,13 @@ class Linker:
         recent: BoolArray,
         near: Hierarchy,
         light: Light,
-        boxes: FloatArray,
-        told: BoolArray,
         faint: BoolArray,
     ) -> Renewed:
         """Links of `rows` (n,) as they are now that patches have come and gone.
 
         recent (p,): patches that came, which are in the hierarchy `near`. Those that went are -1 among the
-        blockers, or are there again, elsewhere. Of rows that are `told` (n,), all that can make a difference
-        is in `boxes` (k, 2, 3), metres: a link none of whose rays goes there sees what it saw. So do those
-        that are `faint` (n,), as far as anybody cares, if they saw a part and see one.
+        blockers, or are there again, elsewhere. Rows that are `faint` (n,) see what they saw, as far as
+        anybody cares, if they saw a part and see one.
         """
         s, h = self.surfaces, near
         p, q = links.p[rows], links.q[rows]
@@ -192,11 +189,6 @@ class Linker:
         sampled = (kind == PARTIAL) & (before == PARTIAL) & (samples > 0)
         stays = sampled & faint
         left = np.flatnonzero(stays)
-        may_stay = np.flatnonzero(sampled & told & ~faint)
-        stays[may_stay] = ~rays_through(
-            self.rays, boxes, p[may_stay], q[may_stay], tree.corners, tree.corner_count, tree.area,
-            tree.patch, s.normal, tree.axes, tree.centroid, tree.key, samples[may_stay],
-        )  # fmt: skip
         known = np.flatnonzero((kind <= NONE) & ~stays)
         pool = take_ranges(loose, room[known], kept[known])
         # By the rays that they had, so that only what has changed makes a difference, unless these are many.

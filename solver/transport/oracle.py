@@ -21,11 +21,14 @@ and reflectors alike but never splits a uniform lamp in vain.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
 from solver.kernels import kernel
+from solver.parallel import run_chunks
+from solver.transport.elements import ElementTree
 from solver.transport.variation import solve_moment
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.fraction import STRATIFIED
@@ -38,8 +41,31 @@ RESAMPLE: Final = 2
 MAX_SAMPLES: Final = 256
 """Most samples a link takes, 16 rays each."""
 
+_MANY: Final = 1 << 16
+_PARTS: Final = 2
+"""Of so many links each part has an array of its own to add to; the number is fixed, so that sums are the
+same on any machine."""
+
 
 @kernel
+def _add_arriving(
+    p: IntArray,
+    q: IntArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
+    reflectance: FloatArray,
+    radiosity: FloatArray,
+    start: int,
+    stop: int,
+    amplitude: FloatArray,
+) -> None:
+    for link in range(start, stop):
+        i = p[link]
+        j = q[link]
+        amplitude[i] += reflectance[i] * radiosity[j] * residual_p[link]
+        amplitude[j] += reflectance[j] * radiosity[i] * residual_q[link]
+
+
 def arriving_amplitudes(
     p: IntArray,
     q: IntArray,
@@ -47,16 +73,29 @@ def arriving_amplitudes(
     residual_q: FloatArray,
     reflectance: FloatArray,
     radiosity: FloatArray,
-    amplitude: FloatArray,
-) -> None:
-    """Sum over its own links of the RMS radiosity that an element's (n,) function leaves out, W/m2."""
-    for e in range(len(amplitude)):
-        amplitude[e] = 0.0
-    for link in range(len(p)):
-        i = p[link]
-        j = q[link]
-        amplitude[i] += reflectance[i] * radiosity[j] * residual_p[link]
-        amplitude[j] += reflectance[j] * radiosity[i] * residual_q[link]
+) -> FloatArray:
+    """Sum over its own links of the RMS radiosity that an element's (n,) function leaves out, W/m2.
+
+    p, q, residual_p, residual_q (m,) are of the links; luminance reflectance and radiosity (n,).
+    """
+
+    def add(start: int, stop: int, amplitude: FloatArray) -> None:
+        _add_arriving(p, q, residual_p, residual_q, reflectance, radiosity, start, stop, amplitude)
+
+    return _summed(add, len(p), len(reflectance))
+
+
+def _summed(add: Callable[[int, int, FloatArray], None], links: int, elements: int) -> FloatArray:
+    """What ranges of links add to elements (n,): each part of them to an array of its own."""
+    parts = _PARTS if links >= _MANY else 1
+    total = np.zeros((parts, elements))
+
+    def work(start: int, stop: int) -> None:
+        for part in range(start, stop):
+            add(links * part // parts, links * (part + 1) // parts, total[part])
+
+    run_chunks(work, parts, 1)
+    return total[0] if parts == 1 else np.asarray(total.sum(axis=0))
 
 
 @kernel
@@ -103,27 +142,30 @@ def element_residuals(
 
 
 @kernel
-def leaving_bias(
+def _add_leaving(
     p: IntArray,
     q: IntArray,
     residual_p: FloatArray,
     residual_q: FloatArray,
-    parent: IntArray,
-    child: IntArray,
-    child_count: IntArray,
     area: FloatArray,
     reflectance: FloatArray,
     spread: FloatArray,
+    start: int,
+    stop: int,
     bias: FloatArray,
 ) -> None:
-    """Mean radiosity error of each element (n,) if the residuals of all its sources err to one side, W/m2."""
-    for e in range(len(bias)):
-        bias[e] = 0.0
-    for link in range(len(p)):
+    for link in range(start, stop):
         i = p[link]
         j = q[link]
         bias[j] += reflectance[j] * spread[i] * residual_p[link] * (area[i] / area[j])
         bias[i] += reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i])
+
+
+@kernel
+def _share_bias(
+    parent: IntArray, child: IntArray, child_count: IntArray, area: FloatArray, bias: FloatArray
+) -> None:
+    """Let elements err by what their ancestors do too, and then by the mean of their children."""
     for e in range(len(bias)):
         if parent[e] >= 0:
             bias[e] += bias[parent[e]]
@@ -132,6 +174,28 @@ def leaving_bias(
             bias[e] = 0.0
             for k in range(child[e], child[e] + child_count[e]):
                 bias[e] += bias[k] * area[k] / area[e]
+
+
+def leaving_bias(
+    p: IntArray,
+    q: IntArray,
+    residual_p: FloatArray,
+    residual_q: FloatArray,
+    tree: ElementTree,
+    reflectance: FloatArray,
+    spread: FloatArray,
+) -> FloatArray:
+    """Mean radiosity error of each element (n,) if the residuals of all its sources err to one side, W/m2.
+
+    p, q, residual_p, residual_q (m,) are of the links; luminance reflectance and residuals (n,).
+    """
+
+    def add(start: int, stop: int, bias: FloatArray) -> None:
+        _add_leaving(p, q, residual_p, residual_q, tree.area, reflectance, spread, start, stop, bias)
+
+    bias = _summed(add, len(p), len(reflectance))
+    _share_bias(tree.parent, tree.child, tree.child_count, tree.area, bias)
+    return bias
 
 
 @kernel
@@ -154,13 +218,14 @@ def link_errors(
     error_p: FloatArray,
     error_q: FloatArray,
     error_v: FloatArray,
+    irradiance: FloatArray,
 ) -> None:
     """Squared luminance error, times area, that splitting p (error_p) or q (error_q) would resolve,
-    or sampling the visibility more densely (error_v).
+    or sampling the visibility more densely (error_v); and the irradiance by which either end errs at most.
 
     Per element: area (m2), luminance reflectance, mean luminance radiosity and its residual spread
     (W/m2), the share of arriving residuals that counts, and the sums over its links of what arrives
-    and of what its sources err. Outputs (n,) in (W/m2)^2 m2.
+    and of what its sources err. Outputs (n,) in (W/m2)^2 m2, and W/m2.
     """
     for link in range(start, stop):
         i = p[link]
@@ -182,6 +247,7 @@ def link_errors(
         arriving = reflectance[j] * radiosity[i] * residual_q[link] * amplitude[j]
         leaving = reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
         error_q[link] = area[j] * resolved[j] * arriving + area[i] * leaving
+        irradiance[link] = max(radiosity[j] * residual_p[link], radiosity[i] * residual_q[link])
 
 
 @kernel

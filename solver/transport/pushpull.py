@@ -32,7 +32,7 @@ _PARTS: Final = 2
 """Of so many links each part has an array of its own to gather into; the number is fixed, so that sums are
 the same on any machine."""
 
-_AT_ONCE: Final = 1 << 17
+_AT_ONCE: Final = 1 << 18
 """Links gathered over between two yields."""
 
 
@@ -45,15 +45,22 @@ def pull(
     offset: FloatArray,
     functions: FloatArray,
     moments: FloatArray,
+    scale: FloatArray | None = None,
 ) -> None:
-    """Means and first moments (n, 3, channels) of all elements from the functions on the leaves."""
+    """Means and first moments (n, 3, channels) of all elements from the functions on the leaves.
+
+    Those of leaves count times `scale` (n,), where given.
+    """
     channels = functions.shape[2]
     for e in range(len(child) - 1, -1, -1):
         if child[e] < 0:
+            by = 1.0 if scale is None else scale[e]
             for c in range(channels):
-                moments[e, 0, c] = functions[e, 0, c]
-                moments[e, 1, c] = moment[e, 0] * functions[e, 1, c] + moment[e, 1] * functions[e, 2, c]
-                moments[e, 2, c] = moment[e, 1] * functions[e, 1, c] + moment[e, 2] * functions[e, 2, c]
+                du = by * functions[e, 1, c]
+                dv = by * functions[e, 2, c]
+                moments[e, 0, c] = by * functions[e, 0, c]
+                moments[e, 1, c] = moment[e, 0] * du + moment[e, 1] * dv
+                moments[e, 2, c] = moment[e, 1] * du + moment[e, 2] * dv
             continue
         moments[e] = 0.0
         for k in range(child[e], child[e] + child_count[e]):
@@ -79,6 +86,32 @@ def push(parent: IntArray, offset: FloatArray, functions: FloatArray) -> None:
             functions[e, 0, c] += functions[up, 0, c] + offset[e, 0] * du + offset[e, 1] * dv
             functions[e, 1, c] += du
             functions[e, 2, c] += dv
+
+
+@kernel
+def collect(parent: IntArray, offset: FloatArray, closure: FloatArray, received: FloatArray) -> None:
+    """Sum the parts of `received` (parts, n, 3, channels) in the first, push it down, scale by `closure`."""
+    parts, n, _, channels = received.shape
+    total = received[0]
+    for e in range(n):
+        up = parent[e]
+        for part in range(1, parts):
+            for k in range(3):
+                for c in range(channels):
+                    total[e, k, c] += received[part, e, k, c]
+        if up < 0:
+            continue
+        for c in range(channels):
+            du = total[up, 1, c]
+            dv = total[up, 2, c]
+            total[e, 0, c] += total[up, 0, c] + offset[e, 0] * du + offset[e, 1] * dv
+            total[e, 1, c] += du
+            total[e, 2, c] += dv
+    for e in range(n):
+        if closure[e] != 1.0:
+            for k in range(3):
+                for c in range(channels):
+                    total[e, k, c] *= closure[e]
 
 
 @kernel
@@ -130,12 +163,51 @@ def gather(
         for c in range(channels):
             mi = moments[i, 0, c]
             mj = moments[j, 0, c]
-            received[i, 0, c] += to_i * (g * mj + bu * moments[j, 1, c] + bv * moments[j, 2, c])
-            received[i, 1, c] += to_i * au * mj
-            received[i, 2, c] += to_i * av * mj
-            received[j, 0, c] += to_j * (g * mi + au * moments[i, 1, c] + av * moments[i, 2, c])
-            received[j, 1, c] += to_j * bu * mi
-            received[j, 2, c] += to_j * bv * mi
+            at_i = to_i * mj
+            at_j = to_j * mi
+            received[i, 0, c] += g * at_i + to_i * (bu * moments[j, 1, c] + bv * moments[j, 2, c])
+            received[i, 1, c] += au * at_i
+            received[i, 2, c] += av * at_i
+            received[j, 0, c] += g * at_j + to_j * (au * moments[i, 1, c] + av * moments[i, 2, c])
+            received[j, 1, c] += bu * at_j
+            received[j, 2, c] += bv * at_j
+
+
+@kernel
+def add_exchange(
+    p: IntArray,
+    q: IntArray,
+    exchange: FloatArray,
+    patch: IntArray,
+    scale: FloatArray,
+    start: int,
+    stop: int,
+    total: FloatArray,
+) -> None:
+    """Add to `total` (patches,) the exchange areas, m2, of links [start, stop) at the patches of their ends.
+
+    Each counts times the `scale` (patches,) of the other end's.
+    """
+    for link in range(start, stop):
+        i = patch[p[link]]
+        j = patch[q[link]]
+        total[i] += exchange[link] * scale[j]
+        total[j] += exchange[link] * scale[i]
+
+
+def patch_sums(tree: ElementTree, links: LinkTable, scale: FloatArray) -> FloatArray:
+    """What patches (n,) receive on average where all leaves send 1 W/m2, if `scale` (n,) is their closure."""
+    parts = _PARTS if len(links) >= _MANY else 1
+    total = np.zeros((parts, tree.patch_count))
+    exchange = links.exchange
+
+    def work(start: int, stop: int) -> None:
+        for part in range(start, stop):
+            first, last = len(links) * part // parts, len(links) * (part + 1) // parts
+            add_exchange(links.p, links.q, exchange, tree.patch, scale, first, last, total[part])
+
+    run_chunks(work, parts, 1)
+    return np.asarray(total.sum(axis=0) * scale / tree.area[: tree.patch_count])
 
 
 def irradiance_in_steps(
@@ -148,11 +220,10 @@ def irradiance_in_steps(
     `closure` (n,) scales the leaves at both ends of a transfer and `remainder` (n, 3) couples each leaf
     with itself (see `closure.py`).
     """
-    sent = radiosity * closure[:, None, None]
-    moments = np.empty_like(sent)
-    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, sent, moments)
+    moments = np.empty_like(radiosity)
+    pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, radiosity, moments, closure)
     parts = _PARTS if len(links) >= _MANY else 1
-    received = np.zeros((parts, *sent.shape))
+    received = np.zeros((parts, *radiosity.shape))
     exchange = links.exchange
 
     pieces = max(1, -(-len(links) // _AT_ONCE))
@@ -170,9 +241,8 @@ def irradiance_in_steps(
                 )  # fmt: skip
 
         run_chunks(work, parts, 1)
-    total: FloatArray = received[0] if parts == 1 else received.sum(axis=0)
-    push(tree.parent, tree.offset, total)
-    total *= closure[:, None, None]
+    collect(tree.parent, tree.offset, closure, received)
+    total: FloatArray = received[0]
     if remainder.any():
         # The closure's scale is already in the moments of leaves, and divided out again.
         own = moments / closure[:, None, None]

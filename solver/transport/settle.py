@@ -49,38 +49,37 @@ def settle(
     moment, area = tree.moment, tree.area
     _find_unshot(leaves, patch, emission, reflectance, state.radiosity, state.received, unshot)
     direction = unshot.copy()
-    energy = np.zeros(state.channels)
-    _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
     lengths: list[FloatArray] = []
     turns: list[FloatArray] = []
-    for _ in range(MOST_STEPS):
+    before = np.zeros(state.channels)
+    for step in range(MOST_STEPS + 1):
+        energy = np.zeros(state.channels)
         held, left, scale, unsent = _measure(
-            leaves, patch, area, moment, emission, state.radiosity, unshot
+            leaves, patch, area, moment, emission, reflectance, state.radiosity, unshot, energy
         )  # fmt: skip
+        if step:
+            turns.append(_ratio(energy, before))
+            _turn(turns[-1], unshot, direction)
         yield unsent / max(held, 1e-300)
         if np.sqrt(left) <= target * np.sqrt(scale):
             state.loss = min(state.loss, _least_loss(lengths, turns))
             loss = max(state.loss, 1.0 - float(reflectance.max(initial=0.0))) if amplified else 1.0
             if np.sqrt(left) <= target * np.sqrt(scale) * min(1.0, loss / ORDINARY_LOSS):
                 return True
-        moved = yield from state.gather_in_steps(direction)
-        arrived = moved.copy()
+        if step == MOST_STEPS:
+            break
+        arrived = yield from state.gather_in_steps(direction)
         yield None
-        _subtract_from(leaves, patch, reflectance, direction, moved)
         curvature = np.zeros(state.channels)
-        _weigh(leaves, patch, area, moment, reflectance, direction, moved, curvature)
+        _weigh(leaves, patch, area, moment, reflectance, direction, arrived, curvature)
         if np.any((curvature <= 0.0) & (energy > 0.0)):
             return False
-        length = _ratio(energy, curvature)
-        _advance(length, direction, state.radiosity)
-        _advance(length, arrived, state.received)
-        _advance(-length, moved, unshot)
-        before, energy = energy, np.zeros(state.channels)
-        _weigh(leaves, patch, area, moment, reflectance, unshot, unshot, energy)
-        share = _ratio(energy, before)
-        _turn(share, unshot, direction)
-        lengths.append(length)
-        turns.append(share)
+        lengths.append(_ratio(energy, curvature))
+        before = energy
+        _advance(
+            lengths[-1], leaves, patch, reflectance, direction, arrived, state.radiosity, state.received,
+            unshot,
+        )  # fmt: skip
     return False
 
 
@@ -129,29 +128,30 @@ def _find_unshot(
 
 
 @kernel
-def _subtract_from(
-    leaves: IntArray, patch: IntArray, reflectance: Spectra, direction: FloatArray, arrived: FloatArray
+def _advance(
+    length: FloatArray,
+    leaves: IntArray,
+    patch: IntArray,
+    reflectance: Spectra,
+    direction: FloatArray,
+    arrived: FloatArray,
+    radiosity: FloatArray,
+    received: FloatArray,
+    unshot: FloatArray,
 ) -> None:
-    """Make direction - reflectance * arrived of `arrived`, 0 where nothing is reflected."""
-    inner = np.ones(len(arrived), dtype=np.bool_)
-    for e in leaves:
-        inner[e] = False
-        p = patch[e]
-        for c in range(arrived.shape[2]):
-            rho = reflectance[p, c]
-            for k in range(3):
-                arrived[e, k, c] = direction[e, k, c] - rho * arrived[e, k, c] if rho > 0.0 else 0.0
-    for e in range(len(inner)):
-        if inner[e]:
-            arrived[e] = 0.0
-
-
-@kernel
-def _advance(length: FloatArray, step: FloatArray, functions: FloatArray) -> None:
-    for e in range(len(functions)):
+    """Go `length` (channels,) along `direction`, of which elements receive `arrived`."""
+    for e in range(len(received)):
         for k in range(3):
             for c in range(len(length)):
-                functions[e, k, c] += length[c] * step[e, k, c]
+                received[e, k, c] += length[c] * arrived[e, k, c]
+    for e in leaves:
+        for c in range(len(length)):
+            rho = reflectance[patch[e], c]
+            if rho > 0.0:
+                for k in range(3):
+                    step = direction[e, k, c]
+                    radiosity[e, k, c] += length[c] * step
+                    unshot[e, k, c] -= length[c] * (step - rho * arrived[e, k, c])
 
 
 @kernel
@@ -178,16 +178,20 @@ def _weigh(
     area: FloatArray,
     moment: FloatArray,
     reflectance: Spectra,
-    a: FloatArray,
-    b: FloatArray,
+    direction: FloatArray,
+    arrived: FloatArray,
     total: FloatArray,
 ) -> None:
-    """Add to `total` (channels,) the inner products over the leaves, weighted by area over reflectance."""
+    """Add to `total` (channels,) the inner products of `direction` and of what (I - rho T) makes of it.
+
+    Over the leaves, weighted by area over reflectance; elements receive `arrived` of it.
+    """
     for e in leaves:
         for c in range(len(total)):
             rho = reflectance[patch[e], c]
             if rho > 0.0:
-                total[c] += area[e] / rho * _product(moment, a, b, e, c)
+                square = _product(moment, direction, direction, e, c)
+                total[c] += area[e] * (square / rho - _product(moment, direction, arrived, e, c))
 
 
 @kernel
@@ -197,10 +201,15 @@ def _measure(
     area: FloatArray,
     moment: FloatArray,
     emission: Spectra,
+    reflectance: Spectra,
     radiosity: FloatArray,
     unshot: FloatArray,
+    energy: FloatArray,
 ) -> tuple[float, float, float, float]:
-    """W that are held; squares, times area, of what is unshot and of what is reflected; W that are unshot."""
+    """W that are held; squares, times area, of what is unshot and of what is reflected; W that are unshot.
+
+    Adds to `energy` (channels,) the squares of what is unshot, weighted by area over reflectance.
+    """
     held = 0.0
     left = 0.0
     scale = 0.0
@@ -209,7 +218,11 @@ def _measure(
         for c in range(radiosity.shape[2]):
             held += area[e] * abs(radiosity[e, 0, c])
             unsent += area[e] * abs(unshot[e, 0, c])
-            left += area[e] * _product(moment, unshot, unshot, e, c)
+            unshot_square = area[e] * _product(moment, unshot, unshot, e, c)
+            left += unshot_square
+            rho = reflectance[patch[e], c]
+            if rho > 0.0:
+                energy[c] += unshot_square / rho
             emitted = emission[patch[e], c]
             reflected = radiosity[e, 0, c] - emitted
             square = _product(moment, radiosity, radiosity, e, c)

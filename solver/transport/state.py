@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.geometry.surfaces import Surfaces
+from solver.kernels import kernel
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.transport.pushpull import irradiance, irradiance_in_steps, pull, take_in
@@ -91,9 +92,8 @@ class TransportState:
 
     def answering(self) -> FloatArray:
         """Radiosity functions (n, 3, channels) that answer what has been received; of leaves alone right."""
-        patch = self.tree.patch
-        radiosity: FloatArray = self.reflectance[patch][:, None] * self.received
-        radiosity[:, 0] += self.emission[patch]
+        radiosity = np.empty_like(self.received)
+        _answer(self.tree.patch, self.emission, self.reflectance, self.received, radiosity)
         return radiosity
 
     def split(self, ids: IntArray) -> None:
@@ -133,6 +133,18 @@ class TransportState:
             setattr(self, name, getattr(self, name)[kept])
         self.remainder[number[heads]] = 0.0
         self.links.renumber(number, np.arange(self.tree.patch_count, dtype=np.int32))
+
+
+@kernel
+def _answer(
+    patch: IntArray, emission: Spectra, reflectance: Spectra, received: FloatArray, radiosity: FloatArray
+) -> None:
+    for e in range(len(patch)):
+        for c in range(received.shape[2]):
+            rho = reflectance[patch[e], c]
+            radiosity[e, 0, c] = emission[patch[e], c] + rho * received[e, 0, c]
+            radiosity[e, 1, c] = rho * received[e, 1, c]
+            radiosity[e, 2, c] = rho * received[e, 2, c]
 
 
 def linear_functions(tree: ElementTree, functions: FloatArray, elements: IntArray) -> FloatArray:

@@ -28,10 +28,9 @@ class WithinElements:
         tree, links = state.tree, state.links
         reflectance = (state.reflectance @ state.weights)[tree.patch]
         radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
-        amplitude, residual, linear = np.empty((3, len(tree)))
-        arriving_amplitudes(
-            links.p, links.q, links.residual_p, links.residual_q, reflectance, radiosity, amplitude
-        )
+        residual, linear = np.empty((2, len(tree)))
+        ends = links.p, links.q, links.residual_p, links.residual_q
+        amplitude = arriving_amplitudes(*ends, reflectance, radiosity)
         leaf_residuals(tree.parent, tree.area, amplitude, residual)
         received = state.received @ state.weights
         _linear_variances(tree.moment, received, reflectance, linear)
