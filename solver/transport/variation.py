@@ -26,6 +26,8 @@ _CURVATURE: Final = 0.8
 """Mean square of a s^2 + b t^2 from its mean, over the squared difference of Gauss points and centre."""
 _QUADRATURE: Final = 0.1
 """The points' mean may differ from the exact one by this much of it without there being a step."""
+_EXACT: Final = 0.005
+"""The same where all points are in one and the same light, each told exactly."""
 _LEAST: Final = 0.25
 """The quadratic part is taken to be at least this times the square of the linear part over the mean."""
 
@@ -76,6 +78,7 @@ def form_factor_variation(
     mean_u = 0.0
     mean_v = 0.0
     weight = 1.0
+    exact = 0
     for k in range(count + 1):
         if k == count:
             x = centroid[0]
@@ -110,6 +113,7 @@ def form_factor_variation(
             if cosine2 > 0.0:
                 value = cosine1 * cosine2 * source_area / (math.pi * square * square)
         else:
+            exact += 1
             value = point_form_factor(x, y, z, normal[0], normal[1], normal[2], source, source_count, scratch)
         if k == count:
             middle = value
@@ -142,7 +146,13 @@ def form_factor_variation(
         bend = 1.0 - middle * scale
         residual = square_mean * (twist * twist + _CURVATURE * bend * bend)
         # An edge of the light that the points do not show moves the mean, and leaves a step behind.
-        missed = abs(total / count - mean) - _QUADRATURE * mean
+        allowed = _QUADRATURE * mean
+        if exact == count + 1:
+            apart = max(abs(value0 - middle), abs(value1 - middle), abs(value2 - middle))
+            if count == 4:
+                apart = max(apart, abs(value3 - middle))
+            allowed = min(allowed, _EXACT * mean + apart)
+        missed = abs(total / count - mean) - allowed
         if missed > 0.0:
             residual = max(residual, missed * max(mean, total / count))
     # The spot that the points may have missed.

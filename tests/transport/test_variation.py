@@ -128,6 +128,16 @@ def test_spot_that_all_points_miss_is_known(side: float, at: tuple[float, float]
     assert 0.5 < found.residual / expected.residual < 2.0
 
 
+@pytest.mark.parametrize("receiver", [SQUARE, TRIANGLE], ids=["square", "triangle"])
+@pytest.mark.parametrize("distance", [1e-3, 1e-5])
+def test_edge_of_light_that_no_point_sees_is_known(receiver: Points, distance: float) -> None:
+    """A source lies on nearly all of the receiver: a strip that all points miss is as dark as can be."""
+    source = 2.0 * DOWN + np.array([0.0, 0.58, distance])
+    found, expected = told(receiver, source), measured(receiver, source, n=200)
+    assert 0.9 < expected.mean < 0.99
+    assert 0.5 < found.residual / expected.residual < 2.0
+
+
 def test_symmetric_light_arrives_in_the_middle() -> None:
     found = told(SQUARE, placed(DOWN, 0.0, (0.0, 0.0, 1.3)))
     np.testing.assert_allclose(found.position, 0.0, atol=1e-15)
