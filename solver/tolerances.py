@@ -25,5 +25,9 @@ RAY_OFFSET: Final = 2e-6
 """Ray endpoints leave their surface by this times the scene's size: about 16 float32 spacings of the
 unit box in which Embree sees the scene."""
 
+LEAST_RAY_OFFSET: Final = 3e-7
+"""As `RAY_OFFSET`, of rays whose ends are known in float64: of 16 million, at all angles, in places all over
+the unit box, four met their own surfaces from 2e-7, and none from 2.5e-7."""
+
 TOUCH: Final = 1e-6
 """In float32, points nearer to a polygon's plane than this times the scene's size are not behind it."""

@@ -24,6 +24,7 @@ from solver.types import BoolArray, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.blockers import UNKNOWN, first_blockers, renewed_blockers
 from solver.visibility.bvh import Hierarchy, build_hierarchy
 from solver.visibility.fraction import visible_fractions
+from solver.visibility.lifts import ray_lifts
 from solver.visibility.rays import RayScene
 from solver.visibility.shafts import NONE, PARTIAL
 
@@ -119,6 +120,11 @@ class Linker:
         corners = self.surfaces.corners
         middle = corners.mean(axis=1)
         return middle, np.sqrt(np.max(((corners - middle[:, None]) ** 2).sum(axis=2), axis=1))
+
+    @cached_property
+    def lift(self) -> FloatArray:
+        """(p,) how far rays leave all patches."""
+        return ray_lifts(self.surfaces.corners, self.surfaces.normal, self.surfaces.size)
 
     def link(
         self, tree: ElementTree, p: IntArray, q: IntArray, light: Light, keep_dark: bool = False
@@ -284,7 +290,7 @@ class Linker:
             part = partial[samples[partial] == count]
             found = visible_fractions(
                 self.rays, p[part], q[part], tree.corners, tree.corner_count, tree.area, tree.patch,
-                self.surfaces.normal, tree.axes, tree.centroid, tree.moment, tree.key, int(count),
+                self.surfaces.normal, tree.axes, self.lift, tree.centroid, tree.moment, tree.key, int(count),
             )  # fmt: skip
             seen = found.visibility
             visibility[part] = seen

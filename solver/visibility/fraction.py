@@ -153,6 +153,7 @@ def visible_fractions(
     patch: IntArray,
     normals: FloatArray,
     axes: FloatArray,
+    lift: FloatArray,
     centroid: Points,
     moment: FloatArray,
     key: Int64Array,
@@ -161,7 +162,8 @@ def visible_fractions(
     """Visible fractions of the light paths between element pairs p, q (n,), by 16 `samples` rays each.
 
     corners (m, 4, 3), counts (m,), area (m,), patch (m,), centroid (m, 3) and second moments (m, 3) are the
-    elements', as is the key (m,) that their rays go by; normals (k, 3) and axes (k, 2, 3) the patches'.
+    elements', as is the key (m,) that their rays go by; normals (k, 3), axes (k, 2, 3) and lift (k,), of
+    `ray_lifts`, the patches'.
     """
     n = len(p)
     result = VisibleFractions(
@@ -188,9 +190,8 @@ def visible_fractions(
             places: Float32Array = places,
         ) -> None:
             generate_rays(
-                p, q, samples, corners, counts, area, patch, normals, axes, centroid, key, rays.center,
-                rays.scale, rays.offset, first, first + start, first + stop, origins, directions, weights,
-                strata, places,
+                p, q, samples, corners, counts, area, patch, normals, axes, lift, centroid, key, rays.center,
+                rays.scale, first, first + start, first + stop, origins, directions, weights, strata, places,
             )  # fmt: skip
 
         run_chunks(generate, last - first, _CHUNK, max(1, _LEAST // samples))
@@ -213,6 +214,7 @@ def rays_through(
     patch: IntArray,
     normals: FloatArray,
     axes: FloatArray,
+    lift: FloatArray,
     centroid: Points,
     key: Int64Array,
     samples: IntArray,
@@ -236,8 +238,8 @@ def rays_through(
             through: BoolArray = through,
         ) -> None:
             find_rays_through(
-                p, q, number, corners, counts, area, patch, normals, axes, centroid, key, rays.center,
-                rays.scale, rays.offset, local, start, stop, through,
+                p, q, number, corners, counts, area, patch, normals, axes, lift, centroid, key, rays.center,
+                rays.scale, local, start, stop, through,
             )  # fmt: skip
 
         run_chunks(work, len(part), _CHUNK, _LEAST)

@@ -77,11 +77,11 @@ def generate_rays(
     patch: IntArray,
     normals: FloatArray,
     axes: FloatArray,
+    lift: FloatArray,
     centroid: Points,
     key: Int64Array,
     center: FloatArray,
     scale: float,
-    offset: float,
     first: int,
     start: int,
     stop: int,
@@ -138,8 +138,8 @@ def generate_rays(
                 _place(x, centroid[i], axes[patch[i]], places[ray, 2:] if swapped else places[ray, :2])
                 _place(y, centroid[j], axes[patch[j]], places[ray, :2] if swapped else places[ray, 2:])
                 for axis in range(3):
-                    a = np.float32((x[axis] - center[axis]) * scale + offset * n1[axis])
-                    b = np.float32((y[axis] - center[axis]) * scale + offset * n2[axis])
+                    a = np.float32((x[axis] - center[axis]) * scale + lift[patch[i]] * n1[axis])
+                    b = np.float32((y[axis] - center[axis]) * scale + lift[patch[j]] * n2[axis])
                     origins[ray, axis] = a
                     directions[ray, axis] = b - a
             else:
@@ -173,11 +173,11 @@ def find_rays_through(
     patch: IntArray,
     normals: FloatArray,
     axes: FloatArray,
+    lift: FloatArray,
     centroid: Points,
     key: Int64Array,
     center: FloatArray,
     scale: float,
-    offset: float,
     boxes: FloatArray,
     start: int,
     stop: int,
@@ -192,7 +192,7 @@ def find_rays_through(
     places = np.empty((n, 4), dtype=np.float32)
     for link in range(start, stop):
         generate_rays(
-            p, q, samples, corners, counts, area, patch, normals, axes, centroid, key, center, scale, offset,
+            p, q, samples, corners, counts, area, patch, normals, axes, lift, centroid, key, center, scale,
             link, link, link + 1, origins, directions, weights, strata, places,
         )  # fmt: skip
         through[link] = False

@@ -18,6 +18,7 @@ from solver.transport.elements import ElementTree
 from solver.types import Points
 from solver.visibility.brute_force import visible_fraction
 from solver.visibility.fraction import BATCH, VisibleFractions, visible_fractions
+from solver.visibility.lifts import ray_lifts
 from solver.visibility.pair_rays import STRATA
 from solver.visibility.rays import RayScene
 
@@ -92,8 +93,8 @@ def fractions(pair: Pair, samples: int, copies: int = COPIES, blocked: bool = Tr
     world = surfaces_of(pair.first, pair.second, *([pair.blocker] if blocked else []))
     return visible_fractions(
         rays_of(world), p, p + np.int32(copies), tree.corners[both], tree.corner_count[both], tree.area[both],
-        tree.patch[both], s.normal, tree.axes, tree.centroid[both], tree.moment[both],
-        np.arange(2 * copies), samples,
+        tree.patch[both], s.normal, tree.axes, ray_lifts(s.corners, s.normal, s.size), tree.centroid[both],
+        tree.moment[both], np.arange(2 * copies), samples,
     )  # fmt: skip
 
 
