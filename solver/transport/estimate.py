@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from solver.parallel import run_chunks
+from solver.transport.excess import excess_light
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.oracle import (
@@ -86,6 +87,8 @@ class Residuals:
     """(n,) sum over an element's own links of what they bring and its function leaves out, W/m2"""
     bias: FloatArray
     """(n,) error of the mean radiosity if the residuals of all sources err to one side, W/m2"""
+    excess: FloatArray
+    """(n,) of what is sent where it cannot arrive: `excess_light`, (W/m2)^2"""
 
     @staticmethod
     def of(state: TransportState) -> Residuals:
@@ -106,7 +109,8 @@ class Residuals:
             tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
         )
         bias = leaving_bias(*ends, tree, reflectance, spread)
-        return Residuals(Light(mean, reflectance, 0.0), spread, amplitude, bias)
+        excess = excess_light(tree, links, mean)
+        return Residuals(Light(mean, reflectance, 0.0), spread, amplitude, bias, excess)
 
     def grown(self, state: TransportState, fresh: IntArray) -> Residuals:
         """As these, with elements that came since, when links `fresh` did.
@@ -131,6 +135,7 @@ class Residuals:
             np.concatenate([self.spread, self.spread[parent]]),
             np.concatenate([self.amplitude, arriving[n:]]),
             np.concatenate([self.bias, self.bias[parent]]),
+            np.concatenate([self.excess, self.excess[parent]]),
         )
 
     def estimate(self, state: TransportState, links: LinkBatch | IntArray | None = None) -> ErrorEstimate:
@@ -149,14 +154,15 @@ class Residuals:
         rows = links if isinstance(links, np.ndarray) else slice(None)
         p, q, exchange, noise = told.p[rows], told.q[rows], told.open_exchange[rows], told.noise[rows]
         residual_p, residual_q = told.residual_p[rows], told.residual_q[rows]
+        visibility = told.visibility[rows]
         errors, irradiance = np.empty((3, len(p))), np.empty(len(p))
         mean, reflectance = self.light.radiosity, self.light.reflectance
 
         def work(start: int, stop: int) -> None:
             link_errors(
-                p, q, exchange, noise, residual_p, residual_q, tree.area, reflectance, mean, self.spread,
-                resolved, self.amplitude, self.bias, start, stop, errors[SPLIT_P], errors[SPLIT_Q],
-                errors[RESAMPLE], irradiance,
+                p, q, exchange, visibility, noise, residual_p, residual_q, tree.area, reflectance, mean,
+                self.spread, resolved, self.amplitude, self.bias, self.excess, start, stop, errors[SPLIT_P],
+                errors[SPLIT_Q], errors[RESAMPLE], irradiance,
             )  # fmt: skip
 
         run_chunks(work, len(p), 1 << 15, 1 << 12)

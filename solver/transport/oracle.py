@@ -203,6 +203,7 @@ def link_errors(
     p: IntArray,
     q: IntArray,
     open_exchange: FloatArray,
+    visibility: FloatArray,
     noise: FloatArray,
     residual_p: FloatArray,
     residual_q: FloatArray,
@@ -213,6 +214,7 @@ def link_errors(
     resolved: FloatArray,
     amplitude: FloatArray,
     bias: FloatArray,
+    excess: FloatArray,
     start: int,
     stop: int,
     error_p: FloatArray,
@@ -224,8 +226,8 @@ def link_errors(
     or sampling the visibility more densely (error_v); and the irradiance by which either end errs at most.
 
     Per element: area (m2), luminance reflectance, mean luminance radiosity and its residual spread
-    (W/m2), the share of arriving residuals that counts, and the sums over its links of what arrives
-    and of what its sources err. Outputs (n,) in (W/m2)^2 m2, and W/m2.
+    (W/m2), the share of arriving residuals that counts, the sums over its links of what arrives and of
+    what its sources err, and what it sends in error. Outputs (n,) in (W/m2)^2 m2, and W/m2.
     """
     for link in range(start, stop):
         i = p[link]
@@ -247,6 +249,11 @@ def link_errors(
         arriving = reflectance[j] * radiosity[i] * residual_q[link] * amplitude[j]
         leaving = reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
         error_q[link] = area[j] * resolved[j] * arriving + area[i] * leaving
+        if noise[link] > 0.0:
+            # Light that is missing where it is from, or falls on as small a place elsewhere.
+            sent = open_exchange[link] * visibility[link] * max(reflectance[i], reflectance[j]) ** 2
+            error_p[link] += sent * excess[i]
+            error_q[link] += sent * excess[j]
         irradiance[link] = max(radiosity[j] * residual_p[link], radiosity[i] * residual_q[link])
 
 
