@@ -77,10 +77,10 @@ def carry(
         weights=weights,
         emission=emission,
         reflectance=reflectance,
-        radiosity=_in_channels(state, state.radiosity[source], channels),
-        received=_in_channels(state, state.received[source], channels),
-        closure=state.closure[source],
-        remainder=state.remainder[source],
+        radiosity=_in_channels(state, state.radiosity.take(source, axis=0), channels),
+        received=_in_channels(state, state.received.take(source, axis=0), channels),
+        closure=state.closure.take(source),
+        remainder=state.remainder.take(source, axis=0),
         gathers=state.gathers,
     )
     after.closure[fresh] = 1.0
@@ -88,7 +88,7 @@ def carry(
         functions[fresh] = 0.0
     dimmed = np.zeros(len(tree))
     if len(removed):
-        lost = _in_channels(state, lost[source], channels)
+        lost = _in_channels(state, lost.take(source, axis=0), channels)
         lost[fresh] = 0.0
         dimmed = np.abs(lost[:, 0] @ after.weights)
         after.add_received(lost, -1.0)

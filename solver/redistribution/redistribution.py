@@ -30,7 +30,7 @@ from solver.redistribution.matching import Match, match_patches
 from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, moved_rows, unneeded
-from solver.transport.estimate import SAFETY, Residuals, estimate_error
+from solver.transport.estimate import SAFETY, ErrorEstimate, Residuals
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
@@ -179,6 +179,8 @@ class Redistribution(RadiositySolver):
         self.looks = 0
         """Links and pairs looked at anew"""
         self._gathers_before = state.gathers
+        self._told: ErrorEstimate | None = None
+        """The error, as it was told before light had settled"""
 
     @property
     def moments(self) -> FloatArray | None:
@@ -387,12 +389,22 @@ class Redistribution(RadiositySolver):
 
     def _refine_beyond(self) -> Iterator[bool]:
         """Refine what else is needed by the light that has arrived, so that it is settled but once."""
-        estimate = estimate_error(self._state)
+        estimate = self._estimate()
         yield True
-        if self.settings.error_tolerance < estimate.relative:
-            choice = self._choose(estimate)
-            if isinstance(choice, Choice):
-                yield from self._refine(estimate.light, choice)
+        choice = self._choose(estimate) if self.settings.error_tolerance < estimate.relative else None
+        if isinstance(choice, Choice):
+            yield from self._refine(estimate.light, choice)
+        else:
+            self._told = estimate
+
+    def _estimate(self) -> ErrorEstimate:
+        """The error of what has settled.
+
+        It is told before, where nothing is refined since: what was unshot then, no more than the tolerance of
+        all light, makes no more of a difference to errors, which are in proportion to the light.
+        """
+        told, self._told = self._told, None
+        return told or super()._estimate()
 
     def _make_plan(self) -> _Plan:
         """All debts, the most urgent first; `_unlinked` gets into that order too."""

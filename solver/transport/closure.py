@@ -106,8 +106,9 @@ def _balance_patches(state: TransportState, leaf: BoolArray, before: FloatArray)
     scale = np.minimum(of_patches(state.tree, before), 1.0)
     slope = np.full(len(scale), 1.5)
     step, excess = np.zeros((2, len(scale)))
+    exchange = state.links.exchange
     for _ in range(_STEPS):
-        row_sum = patch_sums(state.tree, state.links, scale)
+        row_sum = patch_sums(state.tree, state.links, exchange, scale)
         yield
         if not np.any((row_sum > 1.0 + _EXCESS) | ((scale < 1.0) & (row_sum < 1.0 - _EXCESS))):
             break

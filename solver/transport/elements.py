@@ -201,14 +201,16 @@ class ElementTree:
         number[:before] = patch
         number[inner] = np.arange(len(inner), dtype=np.int32) + tree.patch_count
         for name in _COPIED:
-            getattr(tree, f"_{name}").append(getattr(earlier, name)[inner])
+            column = getattr(tree, f"_{name}")
+            first = column.extend(len(inner))
+            np.take(getattr(earlier, name), inner, axis=0, out=column.live[first:], mode="clip")
         tree._patch.append(patch[earlier.patch[inner]])
         tree._parent.append(number[earlier.parent[inner]])
-        first = earlier.child[inner]
-        tree._child.append(np.where(first >= 0, number[first], -1))
+        child = earlier.child[inner]
+        tree._child.append(np.where(child >= 0, number[child], -1))
         stays = np.flatnonzero(patch >= 0)
-        first = earlier.child[stays]
-        tree.child[patch[stays]] = np.where(first >= 0, number[first], -1)
+        child = earlier.child[stays]
+        tree.child[patch[stays]] = np.where(child >= 0, number[child], -1)
         tree.child_count[patch[stays]] = earlier.child_count[stays]
         return tree, number
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -275,12 +276,12 @@ class LinkTable:
 
     def renumber(self, element: IntArray, patch: IntArray) -> None:
         """Elements and patches get the numbers `element` and `patch` of those that they had; none below 0."""
-        self.p[:] = element[self.p]
-        self.q[:] = element[self.q]
         known = patch >= 0
+        told = [(self.p, element), (self.q, element)]
         if not np.array_equal(patch[known], np.flatnonzero(known)):
-            pool = self.pool
-            run_chunks(lambda start, stop: _renumber(pool, patch, start, stop), len(pool), 1 << 18)
+            told.append((self.pool, patch))
+        for column, number in told:
+            run_chunks(partial(_renumber, column, number), len(column), 1 << 18, 1 << 14)
 
     def forget(self, patch: IntArray, number: int) -> None:
         """Put -1 in the place of blockers that have no new number in `patch` (p,).
@@ -401,7 +402,7 @@ def _forget(
 
 
 @kernel
-def _renumber(pool: IntArray, patch: IntArray, start: int, stop: int) -> None:
+def _renumber(column: IntArray, number: IntArray, start: int, stop: int) -> None:
     for i in range(start, stop):
-        if pool[i] >= 0:
-            pool[i] = patch[pool[i]]
+        if column[i] >= 0:
+            column[i] = number[column[i]]

@@ -147,13 +147,15 @@ def gather(
 ) -> None:
     """Add to the irradiance functions `received` what links [start, stop) bring to both their ends.
 
-    Per link: exchange (n,) m2 and slopes (n, 2) in m2 per metre, visibility included.
+    Per link: exchange (n,) m2 and slopes (n, 2) in m2 per metre, visibility included; 0 where that is 0.
     """
     channels = moments.shape[2]
     for link in range(start, stop):
         i = p[link]
         j = q[link]
         g = exchange[link]
+        if g == 0.0:
+            continue
         au = slope_p[link, 0]
         av = slope_p[link, 1]
         bu = slope_q[link, 0]
@@ -195,11 +197,13 @@ def add_exchange(
         total[j] += exchange[link] * scale[i]
 
 
-def patch_sums(tree: ElementTree, links: LinkTable, scale: FloatArray) -> FloatArray:
-    """What patches (n,) receive on average where all leaves send 1 W/m2, if `scale` (n,) is their closure."""
+def patch_sums(tree: ElementTree, links: LinkTable, exchange: FloatArray, scale: FloatArray) -> FloatArray:
+    """What patches (n,) receive on average where all leaves send 1 W/m2, if `scale` (n,) is their closure.
+
+    `exchange` (m,) is that of the links.
+    """
     parts = _PARTS if len(links) >= _MANY else 1
     total = np.zeros((parts, tree.patch_count))
-    exchange = links.exchange
 
     def work(start: int, stop: int) -> None:
         for part in range(start, stop):

@@ -255,7 +255,7 @@ class RadiositySolver(SlicedSolve):
             if not (yield from self._settle(target)):
                 state.radiosity[:, 1:] = 0.0
                 yield from self._settle(target, strict=True)
-            estimate = estimate_error(state)
+            estimate = self._estimate()
             self.error_estimate = max(estimate.relative, cutoff or 0.0)
             self.norm, self.error_parts = estimate.norm, estimate.parts
             self._rounds += 1
@@ -278,6 +278,10 @@ class RadiositySolver(SlicedSolve):
             self.bound = choice.bound
             yield True
             yield from self._refine(estimate.light, choice)
+
+    def _estimate(self) -> ErrorEstimate:
+        """The error of what has settled."""
+        return estimate_error(self._state)
 
     def _choose(self, estimate: ErrorEstimate) -> Choice | SolveOutcome:
         """What to refine next; or why nothing can be done."""

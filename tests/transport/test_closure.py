@@ -114,7 +114,8 @@ def test_sums_of_patches_are_those_of_a_gather() -> None:
     one = np.zeros((len(state.tree), 3, 1))
     one[:, 0] = 1.0
     gathered = of_patches(state.tree, state.gather(one)[:, 0, 0])
-    np.testing.assert_allclose(patch_sums(state.tree, state.links, scale), gathered, rtol=1e-12)
+    sums = patch_sums(state.tree, state.links, state.links.exchange, scale)
+    np.testing.assert_allclose(sums, gathered, rtol=1e-12)
 
 
 def test_open_scenes_do_not_multiply_light() -> None:
