@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -21,12 +21,13 @@ import numpy as np
 from solver import tolerances
 from solver.arrays import GrowingArray
 from solver.geometry.surfaces import Surfaces
-from solver.parallel import run_chunks
+from solver.redistribution.arrivals import Arrivals
 from solver.redistribution.carrying import Shots, add_moments, carry, moments_of
 from solver.redistribution.debts import UnlinkedPairs, owe
-from solver.redistribution.energy import doubt_of, rank_links, unshot_square
+from solver.redistribution.energy import unshot_square
 from solver.redistribution.marks import Marks
 from solver.redistribution.matching import Match, match_patches
+from solver.redistribution.plan import Plan, make_plan
 from solver.redistribution.reach import boxes_around
 from solver.redistribution.trace import Trace
 from solver.transport.coarsen import coarsen, moved_rows, unneeded
@@ -35,8 +36,7 @@ from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
 from solver.transport.pace import steps
-from solver.transport.pushpull import means
-from solver.transport.refine import NOISE_SHARE, Choice, choose_above
+from solver.transport.refine import Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
 from solver.transport.state import TransportState
@@ -58,7 +58,7 @@ once, and more rays when they are refined."""
 _CLOSER: Final = 0.5
 """Error that what is new may have, of what links had that were there: it is what everybody looks at."""
 
-_EARLY: Final = ((0.3, 32.0), (0.05, 8.0))
+_EARLY: Final = ((0.3, 8.0), (0.1, 1.0))
 """Shares of the energy at stake at which links are refined, while others are still to be looked at; and the
 error from which on they are, of what is refined when nothing changes"""
 
@@ -78,33 +78,8 @@ _IDLE: Final = 1e-3
 """Share of the squared error that may be left to links of which nobody finds out what they see now: they have
 it as noise"""
 
-_FAINT: Final = 0.1
-"""The same of one of them, of what is refined"""
-
-_RANKED: Final = 1 << 14
-"""Debts of a piece of work"""
-
 _FOLDED: Final = 0.03
 """Elements without links are folded back when they are more than this share of all."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Plan:
-    """What is to be looked at, the most important first; n debts."""
-
-    rows: IntArray
-    """(n,) the link, or -1: the next pair without one"""
-    debt: IntArray
-    """(n,) number of the edit"""
-    energy: FloatArray
-    """(n,) at stake, W of luminance"""
-    doubt_of_each: FloatArray
-    """(n,) squared error of the visible fraction that a link is left to, 0 where it is traced"""
-    left: FloatArray
-    """(n + 1,) sum of this and all later energies"""
-    doubt: float
-    """RMS of the radiosity that is at stake, relative to what is reflected"""
-    light: Light
 
 
 class Redistribution(RadiositySolver):
@@ -163,16 +138,8 @@ class Redistribution(RadiositySolver):
         self._boxes += margin * np.array([[-1.0], [1.0]])
         self.trace: Trace = Trace.after(before, match, carried)
         """What has happened since the last solution that somebody looked at closely"""
-        self._guesses = self._fresh
-        """Elements of fresh patches"""
-        self._guess = self._state.received[self._fresh, 0].copy()
-        self._guessed = 1.0
-        """Part of the guessed irradiance of fresh patches that stands for light yet to arrive"""
-        self._guessed_now = 1.0
-        self._arrived: GrowingArray[np.float64] | None = None
-        self._waits = False
-        """Whether something has arrived that elements have not received yet"""
-        self._plan: _Plan | None = None
+        self._arrivals = Arrivals(self._state, self._fresh)
+        self._plan: Plan | None = None
         self._paid = 0
         self._new, self._faded = Marks(), Marks()
         """Links that are new or have changed, and those of them that something has ceased to block"""
@@ -204,7 +171,7 @@ class Redistribution(RadiositySolver):
 
     def hand_over(self) -> TransportState:
         """The state, with what has arrived so far."""
-        self._take_in()
+        self._arrivals.take_in()
         return super().hand_over()
 
     @property
@@ -214,7 +181,7 @@ class Redistribution(RadiositySolver):
 
     def field(self) -> RadiosityField:
         """As the solve's, with what has arrived so far."""
-        self._take_in()
+        self._arrivals.take_in()
         return super().field()
 
     def owed(self) -> dict[int, float]:
@@ -259,7 +226,6 @@ class Redistribution(RadiositySolver):
         plan, state = self._plan, self._state
         assert plan is not None
         moments = self._known_moments()
-        self._arrived = self._nothing()
         coarse = replace(plan.light, noise_limit=_FIRST_NOISE * self.bound)
         since, before = 0, self._paid
         for batch in self.pace.batches(np.ones(len(plan.energy) - before, dtype=np.int64)):
@@ -279,7 +245,7 @@ class Redistribution(RadiositySolver):
             self.looks += part.stop - part.start
             self.version += 1
             share = float(plan.left[part.stop]) / at_stake if at_stake > 0.0 else 0.0
-            self._guessed_now = self.unshot_fraction = share
+            self._arrivals.to_come = self.unshot_fraction = share
             self.progress = _PROGRESS * (1.0 - share)
             yield True
             if 0.0 < share <= least:
@@ -287,11 +253,10 @@ class Redistribution(RadiositySolver):
             since += part.stop - part.start
             if self._is_propagations_turn(share, since):
                 since = 0
-                self._take_in()
+                self._arrivals.take_in()
                 if not self._is_almost_done() and self.unshot_power() > float(plan.left[part.stop]):
                     moments = yield from self._propagate()
-        self._take_in()
-        self._arrived = None
+        self._arrivals.take_in()
 
     def _is_almost_done(self) -> bool:
         """Whether what is left to be looked at takes less than a gather does."""
@@ -361,7 +326,7 @@ class Redistribution(RadiositySolver):
         """
         state = self._state
         residuals, moments = Residuals.of(state), GrowingArray.of(self._known_moments())
-        self._moments, self._arrived = None, self._nothing()
+        self._moments = None
         rows = self._new.rows()
         yield True
         while True:
@@ -377,15 +342,13 @@ class Redistribution(RadiositySolver):
             self._new.mark(rows)
             rows.sort()
             add_moments(state, moments)
-            self._arrived.grow(len(state.tree) - len(self._arrived))
             for shots in (worse, Shots.of(state.links, rows)):
-                shots.shoot(state.tree.area, moments.live, self._arrived.live)
-            self._waits = True
+                self._arrivals.shoot(shots, moments.live)
             self.version += 1
             residuals = residuals.grown(state, rows)
-        self._take_in()
-        self._moments, self._arrived = moments.live, None
-        self._spread_guess()
+        self._arrivals.take_in()
+        self._moments = moments.live
+        self._arrivals.spread_guess()
 
     def _refine_beyond(self) -> Iterator[bool]:
         """Refine what else is needed by the light that has arrived, so that it is settled but once."""
@@ -406,47 +369,12 @@ class Redistribution(RadiositySolver):
         told, self._told = self._told, None
         return told or super()._estimate()
 
-    def _make_plan(self) -> _Plan:
+    def _make_plan(self) -> Plan:
         """All debts, the most urgent first; `_unlinked` gets into that order too."""
-        state, pairs = self._state, self._unlinked
-        links, tree = state.links, state.tree
-        rows = np.flatnonzero(links.debt).astype(np.int32)
-        radiosity = np.maximum(means(tree, state.radiosity) @ state.weights, 0.0)
-        reflectance = (state.reflectance @ state.weights)[tree.patch]
-        p, q = np.concatenate([links.p[rows], pairs.p]), np.concatenate([links.q[rows], pairs.q])
-        energy, share, urgency = np.empty((3, len(p)))
-        # What hides links that are in debt to earlier edits is not known any more.
-        known, exchange = np.abs(links.debt[rows]) == self._number, links.open_exchange[rows]
-        run_chunks(
-            lambda start, stop: rank_links(
-                p, q, exchange, tree.area, tree.centroid, tree.patch, self.surfaces.normal, radiosity,
-                reflectance, self._boxes, known, energy, share, urgency, start, stop,
-            ),
-            len(p),
-            _RANKED,
+        self._plan, self._unlinked = make_plan(
+            self._state, self._unlinked, self._number, self._boxes, self._fresh, self.norm,
+            _IDLE * self.settings.error_tolerance**2 * self.norm, self.bound,
         )  # fmt: skip
-        # What an emitter sends out that came with the edit is what everybody looks at.
-        first = np.zeros(self.surfaces.patch_count, dtype=np.bool_)
-        first[self._fresh] = state.emission[self._fresh].any(axis=1)
-        rank = urgency
-        if first.any():
-            lit = first[tree.patch[p]] | first[tree.patch[q]]
-            rank = urgency + np.where(lit, 1.0 + urgency.max(initial=0.0), 0.0)
-        order = np.argsort(-rank)
-        urgency, energy = urgency[order], energy[order]
-        faint = _sums_from(urgency)[:-1] < _IDLE * self.settings.error_tolerance**2 * self.norm
-        faint &= urgency < _FAINT * self.bound
-        paired = order[order >= len(rows)] - len(rows)
-        self._unlinked = UnlinkedPairs(pairs.p[paired], pairs.q[paired], pairs.debt[paired])
-        self._plan = _Plan(
-            doubt=doubt_of(p[order], q[order], energy, tree.area) / math.sqrt(max(self.norm, 1e-300)),
-            rows=np.concatenate([rows, np.full(len(pairs), -1, dtype=np.int32)])[order],
-            debt=np.concatenate([links.debt[rows], pairs.debt])[order],
-            energy=energy,
-            doubt_of_each=np.where(faint, share[order] ** 2, 0.0),
-            left=_sums_from(energy),
-            light=Light(radiosity, reflectance, NOISE_SHARE * self.bound),
-        )
         self._paid = 0
         return self._plan
 
@@ -492,41 +420,12 @@ class Redistribution(RadiositySolver):
         slope_q: FloatArray,
         moments: FloatArray,
     ) -> None:
-        assert self._arrived is not None
         area, weights = self._state.tree.area, self._state.weights
         to_p = exchange / area[batch.p] * (moments[batch.q, 0] @ weights)
         to_q = exchange / area[batch.q] * (moments[batch.p, 0] @ weights)
         self.trace.disturb(batch.p, batch.q, to_p, to_q)
         self._ray_count += STRATA * int(batch.samples.sum())
-        shots = Shots(batch.p, batch.q, exchange, slope_p, slope_q)
-        shots.shoot(area, moments, self._arrived.live)
-        self._waits = True
-
-    def _nothing(self) -> GrowingArray[np.float64]:
-        """Irradiance functions for what will arrive."""
-        return GrowingArray.of(np.zeros_like(self._state.received))
-
-    def _take_in(self) -> None:
-        """Add what has arrived to what elements have received."""
-        if self._arrived is not None and self._waits:
-            # Elements may have been divided since.
-            self._arrived.grow(len(self._state.tree) - len(self._arrived))
-            self._state.add_received(self._arrived.live)
-            self._arrived.live[...] = 0.0
-            self._waits = False
-        if self._guessed != self._guessed_now:
-            self._state.received[self._guesses, 0] -= (self._guessed - self._guessed_now) * self._guess
-            self._guessed = self._guessed_now
-
-    def _spread_guess(self) -> None:
-        """What is guessed of patches is guessed of all that has become of them."""
-        patch = self._state.tree.patch
-        place = np.full(self.surfaces.patch_count, -1, dtype=np.int32)
-        place[self._fresh] = np.arange(len(self._fresh), dtype=np.int32)
-        # Patches are the first elements.
-        guess = self._guess[: len(self._fresh)]
-        self._guesses = np.flatnonzero(place[patch] >= 0).astype(np.int32)
-        self._guess = guess[place[patch[self._guesses]]]
+        self._arrivals.shoot(Shots(batch.p, batch.q, exchange, slope_p, slope_q), moments)
 
     def _fresh_since(self, match: Match, earlier: RadiositySolver) -> BoolArray:
         """Patches (p,) that some link in debt has never met."""
@@ -553,10 +452,3 @@ class Redistribution(RadiositySolver):
         rank[left] = np.arange(len(left), dtype=np.int32)
         p, q = self._linker.facing_pairs(left, rank, 0, len(left))
         return pairs.joined(UnlinkedPairs(p, q, np.full(len(p), number, dtype=np.int32)))
-
-
-def _sums_from(values: FloatArray) -> FloatArray:
-    """The sums (n + 1,) of each of `values` (n,) and all that follow."""
-    sums = np.zeros(len(values) + 1)
-    np.cumsum(values[::-1], out=sums[-2::-1])
-    return sums
