@@ -154,13 +154,13 @@ class Residuals:
         rows = links if isinstance(links, np.ndarray) else slice(None)
         p, q, exchange, noise = told.p[rows], told.q[rows], told.open_exchange[rows], told.noise[rows]
         residual_p, residual_q = told.residual_p[rows], told.residual_q[rows]
-        visibility = told.visibility[rows]
+        kind, visibility = told.kind[rows], told.visibility[rows]
         errors, irradiance = np.empty((3, len(p))), np.empty(len(p))
         mean, reflectance = self.light.radiosity, self.light.reflectance
 
         def work(start: int, stop: int) -> None:
             link_errors(
-                p, q, exchange, visibility, noise, residual_p, residual_q, tree.area, reflectance, mean,
+                p, q, kind, exchange, visibility, noise, residual_p, residual_q, tree.area, reflectance, mean,
                 self.spread, resolved, self.amplitude, self.bias, self.excess, start, stop, errors[SPLIT_P],
                 errors[SPLIT_Q], errors[RESAMPLE], irradiance,
             )  # fmt: skip

@@ -5,7 +5,7 @@ that are larger than it know how much of them is hidden, on average, but not tha
 the product of the means is not the mean of the products, and what stands between may be hit by no ray of a
 few. Conservation tells: under the surface, form factors sum to 1 over its links alone, so that whatever else
 is seen from there is seen in error. What the residuals and the noise of links tell already is taken off, by
-squares, and the rest is laid to the links that are known from rays, in proportion to what they bring.
+squares, and the rest is laid to the links that something stands between, in proportion to what they bring.
 
 On average over an element no more can be seen in error than is known to be hidden: what rays do not see, such
 as gaps that are smaller than their offset, is not resolved by subdivision.
@@ -23,6 +23,7 @@ from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.types import FloatArray, IntArray
+from solver.visibility.shafts import PARTIAL
 
 _TOLD: Final = 2.0
 """Times as much as the squared error that links tell of themselves is theirs, not an excess"""
@@ -36,8 +37,8 @@ same on any machine."""
 def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> FloatArray:
     """Mean square (n,) of the radiosity times the part of it that is sent in error, over each element.
 
-    In (W/m2)^2, of the mean luminance radiosity (n,) of leaves. What all links of an element that are known
-    from rays send in error, they do in proportion to their form factors.
+    In (W/m2)^2, of the mean luminance radiosity (n,) of leaves. Those links of an element that something
+    stands between send it, in proportion to their form factors.
     """
     n = len(tree)
     parts = _PARTS if len(links) >= _MANY else 1
@@ -46,9 +47,9 @@ def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> 
     def work(start: int, stop: int) -> None:
         for part in range(start, stop):
             _add(
-                links.p, links.q, links.open_exchange, links.visibility, links.noise, links.slope_p,
-                links.slope_q, links.residual_p, links.residual_q, tree.area, len(links) * part // parts,
-                len(links) * (part + 1) // parts, sums[part],
+                links.p, links.q, links.kind, links.open_exchange, links.visibility, links.noise,
+                links.slope_p, links.slope_q, links.residual_p, links.residual_q, tree.area,
+                len(links) * part // parts, len(links) * (part + 1) // parts, sums[part],
             )  # fmt: skip
 
     run_chunks(work, parts, 1)
@@ -62,6 +63,7 @@ def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> 
 def _add(
     p: IntArray,
     q: IntArray,
+    kind: IntArray,
     open_exchange: FloatArray,
     visibility: FloatArray,
     noise: FloatArray,
@@ -76,8 +78,8 @@ def _add(
 ) -> None:
     """Add the form factors of links [start, stop) to those of either end.
 
-    sums (n, 8): the function that they come to, as mean and gradient; the same of links that are known from
-    rays; the squared error that is told of them; and what the latter would be if nothing stood between.
+    sums (n, 8): the function that they come to, as mean and gradient; the same of links that something stands
+    between; the squared error that is told of all; and what the latter would be if nothing did.
     """
     for link in range(start, stop):
         for end in range(2):
@@ -92,7 +94,7 @@ def _add(
             sums[e, 1] += u
             sums[e, 2] += v
             sums[e, 6] += residual * residual
-            if noise[link] > 0.0:
+            if kind[link] == PARTIAL:
                 sums[e, 3] += mean
                 sums[e, 4] += u
                 sums[e, 5] += v

@@ -32,6 +32,7 @@ from solver.transport.elements import ElementTree
 from solver.transport.variation import solve_moment
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.fraction import STRATIFIED
+from solver.visibility.shafts import PARTIAL
 
 SPLIT_P: Final = 0
 SPLIT_Q: Final = 1
@@ -202,6 +203,7 @@ def leaving_bias(
 def link_errors(
     p: IntArray,
     q: IntArray,
+    kind: IntArray,
     open_exchange: FloatArray,
     visibility: FloatArray,
     noise: FloatArray,
@@ -249,7 +251,7 @@ def link_errors(
         arriving = reflectance[j] * radiosity[i] * residual_q[link] * amplitude[j]
         leaving = reflectance[i] * spread[j] * residual_q[link] * (area[j] / area[i]) * bias[i]
         error_q[link] = area[j] * resolved[j] * arriving + area[i] * leaving
-        if noise[link] > 0.0:
+        if kind[link] == PARTIAL:
             # Light that is missing where it is from, or falls on as small a place elsewhere.
             sent = open_exchange[link] * visibility[link] * max(reflectance[i], reflectance[j]) ** 2
             error_p[link] += sent * excess[i]
