@@ -38,8 +38,11 @@ def plot_edits(found: list[Any], directory: Path) -> None:
         for cell, (name, _) in zip(axes[-1], _ACROSS, strict=True):
             cell.set_xlabel(name)
         axes[0, 0].legend(fontsize="small")
-        picture.suptitle(f"{figures.edit.scene}: {figures.edit.label}, on {figures.elements:,} elements")
-        name = f"{figures.edit.scene} {figures.edit.label}".replace(" ", "_")
+        told = f"tolerance {100.0 * figures.tolerance:g} %"
+        picture.suptitle(
+            f"{figures.edit.scene}: {figures.edit.label}, on {figures.elements:,} elements, {told}"
+        )
+        name = f"{figures.edit.scene} {figures.edit.label} {100.0 * figures.tolerance:g}".replace(" ", "_")
         picture.savefig(directory / f"{name}.png", dpi=110)
 
 

@@ -141,8 +141,8 @@ def test_edits_are_measured(tmp_path: Path) -> None:
     assert len(table.targets) == 4
     plot_edits([figures], tmp_path)
     assert sorted(file.name for file in tmp_path.iterdir()) == [
-        "cube_room_add_cube.png",
-        "cube_room_move_cube_by_0.5_m.png",
+        "cube_room_add_cube_10.png",
+        "cube_room_move_cube_by_0.5_m_10.png",
     ]
 
 
@@ -161,7 +161,11 @@ def test_drags_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_sections_hold_the_scenes_that_are_edited() -> None:
     whole, quick = Options(), Options(("cornell", "cube_room"), quick=True)
-    assert [job.label for job in edits.section(whole).jobs] == ["cube_room", "robot_cell"]
+    assert [job.label for job in edits.section(whole).jobs] == [
+        "cube_room",
+        "robot_cell",
+        "robot_cell, 3.3 %",
+    ]
     assert [job.label for job in edits.section(quick).jobs] == ["cube_room"]
     assert len(drags.section(whole).jobs) == 6, "three edits at two tolerances"
     assert [job.label for job in drags.section(quick).jobs] == [
