@@ -193,8 +193,9 @@ def tabulate(found: list[SceneEdits]) -> Table:
         "Edits of a converged scene",
         (
             "scene", "tolerance", "edit", "method", "CPU s", "wall s", "times as fast", "ms to begin",
-            "longest slice ms", "elements that shot", "links looked at", "pairs shot over", "CPU s to 20 %", "to 5 %",
-            "after 0.5 CPU s", "from its own end", "at the end", "everywhere, after 0.5 CPU s", "at the end",
+            "longest slice ms", "elements that shot", "links looked at", "pairs shot over", "CPU s to 20 %",
+            "to 5 %", "after 0.5 CPU s", "from its own end", "at the end", "everywhere, after 0.5 CPU s",
+            "at the end",
         ),
         tuple(row for scene in found for figures in scene.edits for row in _rows(figures)),
         "Errors: of reflected luminance (George et al. 1990, eq. 7), over the 1 % of the elements, by their "
