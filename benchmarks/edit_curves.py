@@ -59,6 +59,11 @@ class Curve:
         there = [sample for sample in self.samples if sample.work.cpu <= seconds]
         return there[-1] if there else self.samples[0]
 
+    def within(self, seconds: float) -> Sample:
+        """The last sample within a time of the clock; the first, where that comes later."""
+        there = [sample for sample in self.samples if sample.work.wall <= seconds]
+        return there[-1] if there else self.samples[0]
+
     def until(self, where_most: float) -> float:
         """CPU seconds until the error where most changes stays within a bound; infinite if it never does."""
         after = float("inf")

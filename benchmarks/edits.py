@@ -194,8 +194,8 @@ def tabulate(found: list[SceneEdits]) -> Table:
         (
             "scene", "tolerance", "edit", "method", "CPU s", "wall s", "times as fast", "ms to begin",
             "longest slice ms", "elements that shot", "links looked at", "pairs shot over", "CPU s to 20 %",
-            "to 5 %", "after 0.5 CPU s", "from its own end", "at the end", "everywhere, after 0.5 CPU s",
-            "at the end",
+            "to 5 %", "after 0.5 CPU s", "from its own end", "after 0.5 s", "from its own end", "at the end",
+            "everywhere, after 0.5 CPU s", "at the end",
         ),
         tuple(row for scene in found for figures in scene.edits for row in _rows(figures)),
         "Errors: of reflected luminance (George et al. 1990, eq. 7), over the 1 % of the elements, by their "
@@ -225,7 +225,7 @@ def _rows(figures: EditFigures) -> list[Row]:
 
 def _cells(figures: EditFigures, curve: Curve) -> tuple[str, ...]:
     run = {FRESH: figures.anew, str(SolverSettings().interleaving): figures.redistribution}.get(curve.method)
-    end, soon = curve.samples[-1], curve.after(SOON)
+    end, soon, by_clock = curve.samples[-1], curve.after(SOON), curve.within(SOON)
     looks = end.work.looks
     return (
         f"{end.work.cpu if run is None else run.cpu:.3f}",
@@ -241,6 +241,8 @@ def _cells(figures: EditFigures, curve: Curve) -> tuple[str, ...]:
         percent(soon.error.where_most),
         # Shooting may have been ended before.
         "" if curve.method == SHOOTING else percent(soon.to_come.where_most),
+        percent(by_clock.error.where_most),
+        "" if curve.method == SHOOTING else percent(by_clock.to_come.where_most),
         percent(end.error.where_most),
         percent(soon.error.everywhere),
         percent(end.error.everywhere),
