@@ -28,6 +28,11 @@ from solver.visibility.shafts import PARTIAL
 _TOLD: Final = 2.0
 """Times as much as the squared error that links tell of themselves is theirs, not an excess"""
 
+_SCATTERED: Final = 0.05
+"""By so much sums of single leaves scatter about 1: gradients of visibility are told by few rays, too, which
+makes some leaves see more and others less. What is less than this counts as far as it does not cancel over a
+patch."""
+
 _MANY: Final = 1 << 16
 _PARTS: Final = 2
 """Of so many links each part has an array of its own to add to; the number is fixed, so that sums are the
@@ -55,7 +60,10 @@ def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> 
     run_chunks(work, parts, 1)
     total = sums[0] if parts == 1 else sums.sum(axis=0)
     excess = np.empty(n)
-    _find(tree.parent, tree.child, tree.child_count, tree.area, tree.offset, radiosity, total, excess)
+    _find(
+        tree.patch_count, tree.patch, tree.parent, tree.child, tree.child_count, tree.area, tree.offset,
+        radiosity, total, excess,
+    )  # fmt: skip
     return excess
 
 
@@ -104,6 +112,8 @@ def _add(
 
 @kernel
 def _find(
+    patches: int,
+    patch: IntArray,
     parent: IntArray,
     child: IntArray,
     child_count: IntArray,
@@ -115,6 +125,9 @@ def _find(
 ) -> None:
     n = len(parent)
     share = np.zeros(n)
+    # Of each patch: what sums a little above 1 come to, and those below.
+    more = np.zeros(patches)
+    less = np.zeros(patches)
     most = np.empty(n)
     for e in range(n):
         # What the own links of an element can see in error on average, as a part of what they see.
@@ -130,8 +143,20 @@ def _find(
             sums[e, 5] += up[5]
             sums[e, 6] += up[6]
         excess[e] = 0.0
-        if child[e] < 0 and sums[e, 0] > 1.0 and sums[e, 3] > 0.0:
-            over = math.sqrt(max(0.0, (sums[e, 0] - 1.0) ** 2 - _TOLD * sums[e, 6]))
+        over = sums[e, 0] - 1.0
+        if child[e] < 0 and sums[e, 3] > 0.0:
+            power = area[e] * radiosity[e]
+            if over < 0.0:
+                less[patch[e]] += power * min(-over, _SCATTERED)
+            elif over < _SCATTERED:
+                more[patch[e]] += power * over
+    for e in range(n):
+        over = sums[e, 0] - 1.0
+        if child[e] < 0 and over > 0.0 and sums[e, 3] > 0.0:
+            over = math.sqrt(max(0.0, over * over - _TOLD * sums[e, 6]))
+            if sums[e, 0] - 1.0 < _SCATTERED:
+                p = patch[e]
+                over *= max(0.0, more[p] - less[p]) / (more[p] + less[p]) if more[p] > 0.0 else 0.0
             share[e] = min(1.0, over / sums[e, 3])
             sent = radiosity[e] * share[e]
             excess[e] = sent * sent * sums[e, 3]

@@ -7,10 +7,11 @@ import pytest
 
 from solver.engine.world import World
 from solver.transport.excess import excess_light
+from solver.transport.field import SolveOutcome
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray
 from tests.accuracy.measure import measure
-from tests.pathtracing.worlds import material, square, world
+from tests.pathtracing.worlds import material, polygon, square, world
 from tests.transport.solving import box, furnace, lit_cube, shelf, solved, solver_of, state_of
 
 CORNERS = [(0.3, 0.7), (0.17, 0.5), (0.61, 0.71)]
@@ -79,3 +80,14 @@ def test_errors_are_told_and_energy_kept(gap: float, low: float, high: float, ba
 
 def test_a_gap_that_rays_do_not_see_is_not_split_for_ever() -> None:
     assert solved(room(1e-7, 0.3, 0.7), 0.05).statistics().links < 20_000
+
+
+def test_sums_that_only_scatter_are_not_refined_for_ever() -> None:
+    """A lamp that a thin screen hides from parts of a closed room: its leaves see a little too much or little."""
+    lamp = polygon("lamp", [[0.4, 0.4, 0.9], [0.4, 0.6, 0.9], [0.6, 0.6, 0.9]], material(0.0, 10.0))
+    upright = [[0.3, 0.5, 0.1], [0.7, 0.5, 0.1], [0.7, 0.5, 0.6], [0.3, 0.5, 0.6]]
+    screen = polygon("screen", upright, material(0.5, two_sided=True))
+    table = square("table", material(0.5), 0.3, low=0.1, high=0.4)
+    solver = solved(world(box("room", 0.5), lamp, screen, table), 0.02)
+    assert solver.outcome is SolveOutcome.CONVERGED
+    assert solver.statistics().links < 50_000
