@@ -25,6 +25,7 @@ from solver.engine.checkpoint_fine import interpolants_alone
 from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
 from solver.engine.exports.files import Export, ExportRequest, encode_export
 from solver.engine.fine import FineLight
+from solver.engine.followed import FollowedLight, follow
 from solver.engine.frame_times import FrameTimes
 from solver.engine.gathers import GatherFrames
 from solver.engine.grids import Grid, GridRequest, grid_of
@@ -119,6 +120,8 @@ class Engine:
         self.frame_times = FrameTimes()
         self._seen: Interpolants | None = None
         """The last interpolants, if what has happened to the light since then is traced"""
+        self._followed: FollowedLight | None = None
+        """The same, as frames show them until there are others"""
         self._moved: ObjectId | None = None
         """What the edits since the last transition, or those of it, have moved, if nothing else"""
         self._drags = False
@@ -367,11 +370,15 @@ class Engine:
     ) -> None:
         """Let light settle in `world`, anew or from what it was `earlier`, or was `kept`."""
         seen = None if self._fine is None else self._fine.interpolants
+        if self._fine is not None and seen is not None:
+            self._followed = follow(self._fine)
         solution = Solution(
             world, self._settings, earlier, self._revision, drags, self._memory, seen is not None, kept
         )
         self._kept = None if kept is None else interpolants_alone(kept)
         self._seen = None if solution.trace() is None else seen or self._seen
+        if self._seen is None:
+            self._followed = None
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
         if self._instant is not None:
@@ -411,7 +418,7 @@ class Engine:
             return view
         if fine is not None:
             fine.ask(camera)
-        return InterpolantView(view, fine)
+        return InterpolantView(view, fine, self._followed)
 
     def _fine_light(self) -> FineLight | None:
         """Fine light, once the solution rests; a sampled one never has any."""

@@ -95,6 +95,11 @@ class FineLight:
     # --- what it holds -------------------------------------------------------------------------------
 
     @property
+    def solution(self) -> Solution:
+        """The solution that it is of."""
+        return self._solution
+
+    @property
     def interpolants(self) -> Interpolants | None:
         """The interpolants; None until there are any."""
         return self._interpolants
@@ -222,7 +227,7 @@ class FineLight:
             if self._interpolants is not None:
                 self._evaluations += self._interpolants.evaluations
             elif before is not None and trace is not None:
-                doubt = trace.at_leaves(state.tree)
+                doubt = trace.at_elements(state.tree)[state.tree.leaves]
                 self._taken_over = interpolants.follow(before, trace.patch, doubt)
                 self._before = None
             if kept is not None:

@@ -12,8 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from solver.engine.drawing import Drawing
+from solver.engine.drawing import LIT_LAYERS, Drawing
 from solver.engine.fine import FineLight
+from solver.engine.followed import FollowedLight
 from solver.engine.gathers import GatherFrame
 from solver.engine.instant.frames import AskedInstant
 from solver.engine.paths import AskedFrame
@@ -143,11 +144,13 @@ class SolutionView:
 
 @dataclass(frozen=True, eq=False)
 class InterpolantView:
-    """The interpolants of a solution at rest seen by a camera; before, the solution as it stands."""
+    """The interpolants of a solution at rest seen by a camera; before, earlier ones that follow it."""
 
     coarse: SolutionView
     fine: FineLight | None
     """None while the solution is worked on"""
+    followed: FollowedLight | None = None
+    """What is shown until there are interpolants, if there were some before an edit"""
 
     @property
     def drawable(self) -> bool:
@@ -182,11 +185,15 @@ class InterpolantView:
 
     def draw(self) -> AnyArray:
         """The picture. Raises RenderingUnavailableError."""
+        c, meanwhile = self.coarse, None
         mesh = None if self.fine is None else self.fine.mesh()
+        if mesh is None and self.followed is not None and c.layer in LIT_LAYERS:
+            mesh, meanwhile = self.followed.mesh(c.solution), c.meanwhile
         if mesh is None:
-            return self.coarse.draw()
-        c = self.coarse
-        return c.drawing.draw_mesh(c.solution.world, mesh, c.camera, c.renderer, c.layer, c.samples)
+            return c.draw()
+        return c.drawing.draw_mesh(
+            c.solution.world, mesh, c.camera, c.renderer, c.layer, c.samples, meanwhile
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,12 +45,12 @@ class Trace:
         """Only some elements (k,), ascending, are there from now on."""
         self.disturbed = self.disturbed[elements[elements < len(self.disturbed)]]
 
-    def at_leaves(self, tree: ElementTree) -> FloatArray:
-        """The same (leaves,) over the links of a leaf and of all elements that hold it."""
+    def at_elements(self, tree: ElementTree) -> FloatArray:
+        """The same (n,) over the links of an element and of all that hold it."""
         total = np.zeros(len(tree))
         total[: len(self.disturbed)] = self.disturbed
         _push_down(tree.parent, total)
-        return total[tree.leaves]
+        return total
 
 
 @kernel

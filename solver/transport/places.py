@@ -1,37 +1,66 @@
-"""The leaves that points lie on."""
+"""The leaves that points lie on, and what functions on elements are there."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 
 from solver.kernels import kernel
+from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
-from solver.types import Corners, FloatArray, IntArray, Points
+from solver.types import Corners, FloatArray, IntArray, Points, Spectra
+
+_CHUNK: Final = 1 << 12
+_LEAST: Final = 1 << 8
 
 
-def leaves_at(tree: ElementTree, positions: Points, patch: IntArray) -> IntArray:
-    """The leaf (n,) of `patch` (n,) that each point (n, 3) of its plane lies on, or the nearest to it."""
-    found = np.empty(len(patch), dtype=np.int32)
-    _descend(
-        np.ascontiguousarray(positions), patch, tree.child, tree.child_count, tree.corners, tree.corner_count,
-        tree.patch_normal, found,
+def leaves_at(tree: ElementTree, positions: Points, elements: IntArray) -> IntArray:
+    """The leaf (n,) of `elements` (n,), such as patches, that each point (n, 3) lies on, or is nearest to."""
+    found = np.empty(len(elements), dtype=np.int32)
+    places = np.ascontiguousarray(positions)
+    run_chunks(
+        lambda start, stop: _descend(
+            places, elements, tree.patch, tree.child, tree.child_count, tree.corners, tree.corner_count,
+            tree.patch_normal, start, stop, found,
+        ),
+        len(elements),
+        _CHUNK,
+        _LEAST,
     )  # fmt: skip
+    return found
+
+
+def functions_at(tree: ElementTree, functions: FloatArray, positions: Points, elements: IntArray) -> Spectra:
+    """What linear functions (n, 3, channels) on elements are at points (m, 3) of `elements` (m,)."""
+    found = np.empty((len(positions), functions.shape[2]))
+    run_chunks(
+        lambda start, stop: _evaluate(
+            start, stop, positions, elements, tree.patch, tree.axes, tree.centroid, functions, found
+        ),
+        len(positions),
+        _CHUNK,
+    )
     return found
 
 
 @kernel
 def _descend(
     positions: Points,
+    elements: IntArray,
     patch: IntArray,
     child: IntArray,
     child_count: IntArray,
     corners: Corners,
     corner_count: IntArray,
     normal: FloatArray,
+    start: int,
+    stop: int,
     found: IntArray,
 ) -> None:
-    for i in range(len(patch)):
-        element = patch[i]
+    for i in range(start, stop):
+        element = elements[i]
+        nx, ny, nz = normal[patch[element]]
         while child[element] >= 0:
             # Into the child that the point is deepest within.
             best = -np.inf
@@ -44,7 +73,6 @@ def _descend(
                     sx = corners[part, following, 0] - corners[part, k, 0]
                     sy = corners[part, following, 1] - corners[part, k, 1]
                     sz = corners[part, following, 2] - corners[part, k, 2]
-                    nx, ny, nz = normal[patch[i], 0], normal[patch[i], 1], normal[patch[i], 2]
                     ix, iy, iz = ny * sz - nz * sy, nz * sx - nx * sz, nx * sy - ny * sx
                     length = np.sqrt(ix * ix + iy * iy + iz * iz)
                     if length > 0.0:
@@ -59,3 +87,28 @@ def _descend(
                     chosen = part
             element = chosen
         found[i] = element
+
+
+@kernel
+def _evaluate(
+    start: int,
+    stop: int,
+    positions: Points,
+    elements: IntArray,
+    patch: IntArray,
+    axes: FloatArray,
+    centroid: Points,
+    functions: FloatArray,
+    found: FloatArray,
+) -> None:
+    for i in range(start, stop):
+        e = elements[i]
+        p = patch[e]
+        u = 0.0
+        v = 0.0
+        for axis in range(3):
+            from_centroid = positions[i, axis] - centroid[e, axis]
+            u += axes[p, 0, axis] * from_centroid
+            v += axes[p, 1, axis] * from_centroid
+        for c in range(found.shape[1]):
+            found[i, c] = functions[e, 0, c] + u * functions[e, 1, c] + v * functions[e, 2, c]

@@ -15,7 +15,7 @@ import numpy as np
 from solver.illumination.interpolation.fit import fit_interpolants
 from solver.illumination.interpolation.matching import find_places
 from solver.illumination.interpolation.mesh import InterpolantMesh
-from solver.illumination.interpolation.samples import Samples, place_samples
+from solver.illumination.interpolation.samples import Samples, linear_samples, place_samples
 from solver.illumination.meshing.cells import Cells
 from solver.illumination.meshing.triangulation import Triangulation
 from solver.illumination.points.point_irradiance import PointIrradiance
@@ -64,7 +64,7 @@ class Interpolants:
             np.cross(vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]), axis=1
         )
         self._middle: Points = vertices.mean(axis=1)
-        self._values = self._coarse(vertices)
+        self._values = linear_samples(mesh, self._samples, elements, point.tree, point.received)
         self._exact = np.zeros(len(self._samples.position), dtype=np.bool_)
         self._strayed = np.zeros(len(self._samples.position))
         """How far exact samples may have strayed from point irradiance since they were, relative"""
@@ -122,6 +122,11 @@ class Interpolants:
     def mean_luminance(self) -> FloatArray:
         """(t,) mean luminance irradiance of each triangle, W/m2."""
         return self._mean
+
+    @property
+    def samples(self) -> Samples:
+        """Where the triangles are sampled."""
+        return self._samples
 
     def sample_points(self) -> tuple[Points, Spectra, BoolArray]:
         """Positions (m, 3), irradiances (m, channels), and which of them are exact (m,)."""
@@ -190,28 +195,6 @@ class Interpolants:
         self.evaluations += evaluations
         self.version += 1
         self._mesh = None
-
-    def _coarse(self, vertices: Points) -> Spectra:
-        """Samples by the linear functions of the leaves around them, on average."""
-        tri, node = self.triangulation, self._samples.node
-        places = np.stack(
-            [
-                vertices[:, 0],
-                0.5 * (vertices[:, 0] + vertices[:, 1]),
-                vertices[:, 1],
-                0.5 * (vertices[:, 1] + vertices[:, 2]),
-                vertices[:, 2],
-                0.5 * (vertices[:, 2] + vertices[:, 0]),
-            ],
-            axis=1,
-        )
-        elements = np.repeat(self._elements[tri.leaf], 6)
-        told = np.maximum(self._point.solved(places.reshape(-1, 3), elements), 0.0)
-        m = len(self._samples.position)
-        count = np.bincount(node.ravel(), minlength=m)
-        return np.stack(
-            [np.bincount(node.ravel(), told[:, c], m) / count for c in range(told.shape[1])], axis=1
-        )
 
     def _take_over(self, before: Interpolants) -> None:
         """Keep what has been sampled at the very same places."""

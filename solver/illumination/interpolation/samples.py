@@ -9,7 +9,9 @@ import numpy as np
 
 from solver.illumination.meshing.triangulation import Triangulation
 from solver.kernels import kernel
-from solver.types import BoolArray, FloatArray, IntArray, Points
+from solver.transport.elements import ElementTree
+from solver.transport.places import functions_at
+from solver.types import BoolArray, FloatArray, IntArray, Points, Spectra
 
 NUDGE: Final = 1e-3
 """A sample on a jump, or on the border of a patch, is taken this part of the way towards the middle of its
@@ -67,6 +69,22 @@ def place_samples(mesh: Triangulation) -> Samples:
     nudge = np.where(middle_bounded[of, k, None], NUDGE, 0.0)
     position[corners:] = here + nudge * (centre[of] - here)
     return Samples(node, position, triangle)
+
+
+def linear_samples(
+    mesh: Triangulation, samples: Samples, elements: IntArray, tree: ElementTree, functions: FloatArray
+) -> Spectra:
+    """What linear functions (n, 3, channels) on elements tell at the samples (m, channels), never negative.
+
+    Triangles lie on `elements` (leaves,), as they are numbered in the triangulation; what is told on several
+    triangles around a sample is taken on average.
+    """
+    a, b, c = np.moveaxis(mesh.position[mesh.triangles], 1, 0)
+    places = np.stack([a, 0.5 * (a + b), b, 0.5 * (b + c), c, 0.5 * (c + a)], axis=1).reshape(-1, 3)
+    told = np.maximum(functions_at(tree, functions, places, np.repeat(elements[mesh.leaf], 6)), 0.0)
+    node, m = samples.node.ravel(), len(samples.position)
+    count = np.bincount(node, minlength=m)
+    return np.stack([np.bincount(node, column, m) / count for column in told.T], axis=1)
 
 
 @kernel

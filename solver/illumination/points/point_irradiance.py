@@ -19,12 +19,11 @@ from solver.illumination.points.desk import Elements, Light
 from solver.illumination.points.gather_anywhere import gather_anywhere
 from solver.illumination.points.gather_over_links import Table, gather_over_links
 from solver.illumination.points.light import Lamps, LinksByElement, Sources
-from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.transport.pace import finish
-from solver.transport.places import leaves_at
+from solver.transport.places import functions_at, leaves_at
 from solver.transport.state import TransportState
 from solver.types import FloatArray, IntArray, Points, Spectra
 from solver.visibility.bvh import Hierarchy
@@ -204,16 +203,7 @@ class PointIrradiance:
 
     def solved(self, positions: Points, elements: IntArray) -> Spectra:
         """Irradiance (n, channels) at points on leaves by the solution's own linear functions."""
-        tree = self.tree
-        found = np.empty((len(positions), self.received.shape[2]))
-        run_chunks(
-            lambda start, stop: _evaluate(
-                start, stop, positions, elements, tree.patch, tree.axes, tree.centroid, self.received, found
-            ),
-            len(positions),
-            _MANY,
-        )
-        return found
+        return functions_at(self.tree, self.received, positions, elements)
 
     def at_patches(self, positions: Points, patch: IntArray) -> Spectra:
         """As `solved`, for points on patches (n,), in three channels."""
@@ -225,31 +215,6 @@ def _darkness(state: TransportState) -> float:
     leaves, area = state.tree.leaves, state.tree.area
     received = area[leaves] @ np.maximum(state.received[leaves, 0] @ state.weights, 0.0)
     return _DARKNESS * float(received) / max(float(area[leaves].sum()), 1e-300)
-
-
-@kernel
-def _evaluate(
-    start: int,
-    stop: int,
-    positions: Points,
-    elements: IntArray,
-    patch: IntArray,
-    axes: FloatArray,
-    centroid: Points,
-    functions: FloatArray,
-    found: FloatArray,
-) -> None:
-    for i in range(start, stop):
-        e = elements[i]
-        p = patch[e]
-        u = 0.0
-        v = 0.0
-        for axis in range(3):
-            from_centroid = positions[i, axis] - centroid[e, axis]
-            u += axes[p, 0, axis] * from_centroid
-            v += axes[p, 1, axis] * from_centroid
-        for c in range(found.shape[1]):
-            found[i, c] = functions[e, 0, c] + u * functions[e, 1, c] + v * functions[e, 2, c]
 
 
 def _light(sources: Sources) -> Light:
