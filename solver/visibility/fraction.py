@@ -15,7 +15,7 @@ import numpy as np
 from solver.kernels import kernel
 from solver.parallel import run_chunks
 from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
-from solver.visibility.pair_rays import STRATA, find_rays_through, generate_rays
+from solver.visibility.pair_rays import STRATA, generate_rays
 from solver.visibility.rays import RayScene
 
 STRATIFIED: Final = 0.75
@@ -201,47 +201,3 @@ def visible_fractions(
             result.noise, result.lean_p, result.lean_q, result.residual_p, result.residual_q,
         )  # fmt: skip
     return result
-
-
-def rays_through(
-    rays: RayScene,
-    boxes: FloatArray,
-    p: IntArray,
-    q: IntArray,
-    corners: Corners,
-    counts: IntArray,
-    area: FloatArray,
-    patch: IntArray,
-    normals: FloatArray,
-    axes: FloatArray,
-    lift: FloatArray,
-    centroid: Points,
-    key: Int64Array,
-    samples: IntArray,
-) -> BoolArray:
-    """Whether any of the rays of pairs p, q (n,) meets one of `boxes` (k, 2, 3), metres.
-
-    They are those that `visible_fractions` takes, 16 `samples` (n,) of each pair. Others as there.
-    """
-    local = (boxes - rays.center) * rays.scale
-    found = np.empty(len(p), dtype=np.bool_)
-    for number in np.unique(samples):
-        part = np.flatnonzero(samples == number)
-        some_p, some_q, through = p[part], q[part], np.empty(len(part), dtype=np.bool_)
-
-        def work(
-            start: int,
-            stop: int,
-            number: int = int(number),
-            p: IntArray = some_p,
-            q: IntArray = some_q,
-            through: BoolArray = through,
-        ) -> None:
-            find_rays_through(
-                p, q, number, corners, counts, area, patch, normals, axes, lift, centroid, key, rays.center,
-                rays.scale, local, start, stop, through,
-            )  # fmt: skip
-
-        run_chunks(work, len(part), _CHUNK, _LEAST)
-        found[part] = through
-    return found

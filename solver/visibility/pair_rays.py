@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from solver.kernels import kernel
-from solver.types import BoolArray, ByteArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
+from solver.types import ByteArray, Corners, Float32Array, FloatArray, Int64Array, IntArray, Points
 from solver.visibility.sampling import fraction_of, hash_index, sample_by_solid_angle, sample_element
 
 STRATA: Final = 16
@@ -160,64 +160,3 @@ def _place(x: FloatArray, centroid: FloatArray, axes: FloatArray, out: Float32Ar
         for axis in range(3):
             total += (x[axis] - centroid[axis]) * axes[k, axis]
         out[k] = total
-
-
-@kernel
-def find_rays_through(
-    p: IntArray,
-    q: IntArray,
-    samples: int,
-    corners: Corners,
-    counts: IntArray,
-    area: FloatArray,
-    patch: IntArray,
-    normals: FloatArray,
-    axes: FloatArray,
-    lift: FloatArray,
-    centroid: Points,
-    key: Int64Array,
-    center: FloatArray,
-    scale: float,
-    boxes: FloatArray,
-    start: int,
-    stop: int,
-    through: BoolArray,
-) -> None:
-    """Whether any ray of links [start, stop) meets any of `boxes` (k, 2, 3), in the frame of the rays."""
-    n = STRATA * samples
-    origins = np.empty((n, 3), dtype=np.float32)
-    directions = np.empty((n, 3), dtype=np.float32)
-    weights = np.empty(n)
-    strata = np.empty(n, dtype=np.uint8)
-    places = np.empty((n, 4), dtype=np.float32)
-    for link in range(start, stop):
-        generate_rays(
-            p, q, samples, corners, counts, area, patch, normals, axes, lift, centroid, key, center, scale,
-            link, link, link + 1, origins, directions, weights, strata, places,
-        )  # fmt: skip
-        through[link] = False
-        for ray in range(n):
-            if weights[ray] > 0.0 and _meets(origins[ray], directions[ray], boxes):
-                through[link] = True
-                break
-
-
-@kernel
-def _meets(origin: Float32Array, direction: Float32Array, boxes: FloatArray) -> bool:
-    """Whether the way from `origin` to `origin + direction` meets a box."""
-    for box in range(len(boxes)):
-        begin = 0.0
-        end = 1.0
-        for axis in range(3):
-            d = float(direction[axis])
-            low = boxes[box, 0, axis] - origin[axis]
-            high = boxes[box, 1, axis] - origin[axis]
-            if d == 0.0:
-                if low > 0.0 or high < 0.0:
-                    end = -1.0
-            else:
-                begin = max(begin, min(low / d, high / d))
-                end = min(end, max(low / d, high / d))
-        if begin <= end:
-            return True
-    return False
