@@ -325,7 +325,9 @@ class Redistribution(RadiositySolver):
         What a link brings otherwise once it is refined is shot at once.
         """
         state = self._state
-        residuals, moments = Residuals.of(state), GrowingArray.of(self._known_moments())
+        # Light that cannot arrive is looked for when this is done.
+        residuals = Residuals.of(state, with_excess=False)
+        moments = GrowingArray.of(self._known_moments())
         self._moments = None
         rows = self._new.rows()
         yield True

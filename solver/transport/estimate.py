@@ -91,8 +91,8 @@ class Residuals:
     """(n,) of what is sent where it cannot arrive: `excess_light`, (W/m2)^2"""
 
     @staticmethod
-    def of(state: TransportState) -> Residuals:
-        """As the light stands."""
+    def of(state: TransportState, with_excess: bool = True) -> Residuals:
+        """As the light stands, with what is sent where it cannot arrive, or without."""
         tree, links = state.tree, state.links
         luminance = state.radiosity @ state.weights
         moments = np.empty((len(tree), 3, 1))
@@ -109,7 +109,7 @@ class Residuals:
             tree.child, tree.child_count, tree.area, tree.moment, moments[:, :, 0], variance, spread
         )
         bias = leaving_bias(*ends, tree, reflectance, spread)
-        excess = excess_light(tree, links, mean)
+        excess = excess_light(tree, links, mean) if with_excess else np.zeros(len(tree))
         return Residuals(Light(mean, reflectance, 0.0), spread, amplitude, bias, excess)
 
     def grown(self, state: TransportState, fresh: IntArray) -> Residuals:
