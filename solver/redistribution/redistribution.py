@@ -55,9 +55,6 @@ _FIRST_NOISE: Final = 64.0
 """Noise that links may have at first, of the error that is refined: the strongest ones get some light at
 once, and more rays when they are refined."""
 
-_CLOSER: Final = 0.5
-"""Error that what is new may have, of what links had that were there: it is what everybody looks at."""
-
 _EARLY: Final = ((0.3, 8.0), (0.1, 1.0))
 """Shares of the energy at stake at which links are refined, while others are still to be looked at; and the
 error from which on they are, of what is refined when nothing changes"""
@@ -308,7 +305,7 @@ class Redistribution(RadiositySolver):
             self._new = Marks.of(rows)
         if full:
             self.lean = len(state.links)
-        yield from self._refine_new(_CLOSER * self.bound)
+        yield from self._refine_new(self.bound)
         # From here on elements are divided and light is settled as in any solve.
         self._moments = None
         yield from self._refine_beyond()
