@@ -37,6 +37,9 @@ _log = logging.getLogger(__name__)
 _URGENT: Final = (ApplyEdits, GetPick, Probe, Redo, Undo)
 """Requests that somebody waits for, beside frames"""
 
+_LAST_WORDS: Final = 1.0
+"""Seconds within which the end of a worker is read, once it takes no more calls"""
+
 
 class WorkerGoneError(Exception):
     """The worker has ended."""
@@ -162,6 +165,9 @@ class RemoteWorker:
         try:
             await self._end.send(message)
         except OSError as lost:
+            # Nobody is to call it again before it is known that it has ended.
+            if self._reading is not None:
+                await asyncio.wait([self._reading], timeout=_LAST_WORDS)
             raise WorkerGoneError from lost
 
     async def _read(self) -> None:
