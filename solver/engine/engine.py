@@ -63,7 +63,6 @@ from solver.engine.views import (
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Camera, Scene
-from solver.illumination.interpolation.interpolants import Interpolants
 from solver.illumination.particles.compensation import Known
 from solver.illumination.settings import LightSettings
 from solver.redistribution.memory import Memory
@@ -118,10 +117,8 @@ class Engine:
         self._memory = Memory()
         self._seen_errors = SeenErrors()
         self.frame_times = FrameTimes()
-        self._seen: Interpolants | None = None
-        """The last interpolants, if what has happened to the light since then is traced"""
         self._followed: FollowedLight | None = None
-        """The same, as frames show them until there are others"""
+        """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
         """What the edits since the last transition, or those of it, have moved, if nothing else"""
         self._drags = False
@@ -369,16 +366,12 @@ class Engine:
         self, world: World, earlier: Solution | None, drags: bool, kept: Checkpoint | None = None
     ) -> None:
         """Let light settle in `world`, anew or from what it was `earlier`, or was `kept`."""
-        seen = None if self._fine is None else self._fine.interpolants
-        if self._fine is not None and seen is not None:
-            self._followed = follow(self._fine)
+        seen = None if self._fine is None else follow(self._fine)
         solution = Solution(
             world, self._settings, earlier, self._revision, drags, self._memory, seen is not None, kept
         )
         self._kept = None if kept is None else interpolants_alone(kept)
-        self._seen = None if solution.trace() is None else seen or self._seen
-        if self._seen is None:
-            self._followed = None
+        self._followed = None if solution.trace() is None else seen or self._followed
         self._world, self._solution, self._paths = world, solution, PathFrames(world)
         self._fine, self._gathers = None, None
         if self._instant is not None:
@@ -424,7 +417,8 @@ class Engine:
         """Fine light, once the solution rests; a sampled one never has any."""
         rests = self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED)
         if self._fine is None and rests and not self._solution.is_sampled:
-            self._fine = FineLight(self._solution, self._drawing, self._settings, self._seen, self._kept)
+            before = None if self._followed is None else self._followed.interpolants
+            self._fine = FineLight(self._solution, self._drawing, self._settings, before, self._kept)
         return self._fine
 
     def _instant_view(self, camera: Camera, request: FrameRequest) -> InstantView:

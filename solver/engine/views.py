@@ -188,7 +188,7 @@ class InterpolantView:
         c, meanwhile = self.coarse, None
         mesh = None if self.fine is None else self.fine.mesh()
         if mesh is None and self.followed is not None and c.layer in LIT_LAYERS:
-            mesh, meanwhile = self.followed.mesh(c.solution), c.meanwhile
+            mesh, meanwhile = self.followed.mesh(c.solution, c.drawing), c.meanwhile
         if mesh is None:
             return c.draw()
         return c.drawing.draw_mesh(

@@ -188,8 +188,9 @@ def _draw(drawing: Drawing) -> None:
             _run(engine)
             engine.frame(request)
         _pick_and_probe(engine)
-    # What was seen before an edit is taken over.
+    # What was seen before an edit follows the light, and is taken over.
     engine.apply([_MOVE])
+    engine.frame(FrameRequest(CameraChoice(), RendererName.INTERPOLANT))
     _run(engine)
     for renderer in (RendererName.INTERPOLANT, RendererName.VPL):
         engine.outlook(FrameRequest(CameraChoice(), renderer))

@@ -15,6 +15,7 @@ from solver.engine.requests import CameraChoice, FrameRequest, LayerName, Render
 from solver.engine.status import SessionState
 from solver.geometry.scene import Camera, Scene
 from solver.illumination.settings import LightSettings
+from solver.transport.solve import RadiositySolver
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
 from tests.engine.acting import edits
 from tests.redistribution.rooms import crate, room
@@ -75,16 +76,16 @@ def test_without_an_edit_they_are_what_they_were(drawing: Drawing) -> None:
     fine, solution = engine._fine, engine._solution
     assert fine is not None and fine.interpolants is not None
     followed = follow(fine)
-    assert followed is not None and followed.mesh(solution) is None, "of a fresh solve no change is known"
-    solver = solution.solver
-    surfaces = solution.world.surfaces
-    number = np.arange(surfaces.patch_count, dtype=np.int32)
-    mesh = followed._following.mesh(solver.state, number, np.zeros(len(solver.state.tree)))
-    known = fine.interpolants.mesh()
-    np.testing.assert_array_equal(mesh.triangles, known.triangles)
-    np.testing.assert_allclose(
-        mesh.coefficients, known.coefficients, atol=2e-6 * np.abs(known.coefficients).max()
-    )
+    assert followed is not None and followed.interpolants is fine.interpolants
+    assert followed.mesh(solution, drawing) is None, "of a fresh solve no change is known"
+    solver, known = solution.solver, fine.interpolants.mesh()
+    assert isinstance(solver, RadiositySolver)
+    number = np.arange(known.surfaces.patch_count, dtype=np.int32)
+    found = followed._following.follow(solver.state, number, np.zeros(len(solver.state.tree)))
+    assert not found.by_elements.any()
+    np.testing.assert_array_equal(found.triangles, np.arange(len(known.triangles)))
+    scale = np.abs(known.coefficients).max()
+    np.testing.assert_allclose(found.coefficients, known.coefficients, atol=2e-6 * scale)
 
 
 @pytest.mark.parametrize(

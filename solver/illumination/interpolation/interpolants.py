@@ -15,7 +15,7 @@ import numpy as np
 from solver.illumination.interpolation.fit import fit_interpolants
 from solver.illumination.interpolation.matching import find_places
 from solver.illumination.interpolation.mesh import InterpolantMesh
-from solver.illumination.interpolation.samples import Samples, linear_samples, place_samples
+from solver.illumination.interpolation.samples import Samples, in_channels, linear_samples, place_samples
 from solver.illumination.meshing.cells import Cells
 from solver.illumination.meshing.triangulation import Triangulation
 from solver.illumination.points.point_irradiance import PointIrradiance
@@ -260,12 +260,8 @@ class Interpolants:
         """Irradiances (k, channels) of places (k, 3), from earlier ones, and how doubtful (k,) they are."""
         leaf, leaf_then = self.triangulation.leaf[now_triangle], before.triangulation.leaf[then_triangle]
         told = self._point.solved(now, self._elements[leaf])
-        change = told - _in_channels(before._point.solved(then, before._elements[leaf_then]), told.shape[1])
-        values = np.maximum(_in_channels(values, told.shape[1]) + change, 0.0)
+        change = told - in_channels(before._point.solved(then, before._elements[leaf_then]), told.shape[1])
+        values = np.maximum(in_channels(values, told.shape[1]) + change, 0.0)
         change_seen = np.abs(change) @ self._point.weights
         scale = np.maximum(values @ self._point.weights, 1e-300)
         return values, (change_seen + _SHADOW * doubt[leaf]) / scale
-
-
-def _in_channels(values: Spectra, channels: int) -> Spectra:
-    return values if values.shape[1] == channels else np.repeat(values[:, :1], channels, axis=1)

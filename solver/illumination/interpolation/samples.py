@@ -87,6 +87,11 @@ def linear_samples(
     return np.stack([np.bincount(node, column, m) / count for column in told.T], axis=1)
 
 
+def in_channels(values: Spectra, channels: int) -> Spectra:
+    """Samples (m, 1 or 3) in so many channels; of three that are to be one, the first."""
+    return values if values.shape[1] == channels else np.repeat(values[:, :1], channels, axis=1)
+
+
 @kernel
 def _find(root: IntArray, k: int) -> int:
     while root[k] != k:
