@@ -19,9 +19,9 @@ from typing import Final
 import numpy as np
 
 from solver.kernels import kernel
-from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
+from solver.transport.sums import add_up
 from solver.types import FloatArray, IntArray
 from solver.visibility.shafts import PARTIAL
 
@@ -33,11 +33,6 @@ _SCATTERED: Final = 0.05
 makes some leaves see more and others less. What is less than this counts as far as it does not cancel over a
 patch."""
 
-_MANY: Final = 1 << 16
-_PARTS: Final = 2
-"""Of so many links each part has an array of its own to add to; the number is fixed, so that sums are the
-same on any machine."""
-
 
 def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> FloatArray:
     """Mean square (n,) of the radiosity times the part of it that is sent in error, over each element.
@@ -46,20 +41,14 @@ def excess_light(tree: ElementTree, links: LinkTable, radiosity: FloatArray) -> 
     stands between send it, in proportion to their form factors.
     """
     n = len(tree)
-    parts = _PARTS if len(links) >= _MANY else 1
-    sums = np.zeros((parts, n, 8))
 
-    def work(start: int, stop: int) -> None:
-        for part in range(start, stop):
-            _add(
-                links.p, links.q, links.kind, links.open_exchange, links.visibility, links.noise,
-                links.slope_p, links.slope_q, links.residual_p, links.residual_q, tree.area,
-                len(links) * part // parts, len(links) * (part + 1) // parts, sums[part],
-            )  # fmt: skip
+    def add(start: int, stop: int, sums: FloatArray) -> None:
+        _add(
+            links.p, links.q, links.kind, links.open_exchange, links.visibility, links.noise, links.slope_p,
+            links.slope_q, links.residual_p, links.residual_q, tree.area, start, stop, sums,
+        )  # fmt: skip
 
-    run_chunks(work, parts, 1)
-    total = sums[0] if parts == 1 else sums.sum(axis=0)
-    excess = np.empty(n)
+    total, excess = add_up(add, len(links), (n, 8)), np.empty(n)
     _find(
         tree.patch_count, tree.patch, tree.parent, tree.child, tree.child_count, tree.area, tree.offset,
         radiosity, total, excess,

@@ -21,14 +21,13 @@ and reflectors alike but never splits a uniform lamp in vain.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
 from solver.kernels import kernel
-from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
+from solver.transport.sums import add_up
 from solver.transport.variation import solve_moment
 from solver.types import BoolArray, FloatArray, Int64Array, IntArray
 from solver.visibility.fraction import STRATIFIED
@@ -41,11 +40,6 @@ RESAMPLE: Final = 2
 
 MAX_SAMPLES: Final = 256
 """Most samples a link takes, 16 rays each."""
-
-_MANY: Final = 1 << 16
-_PARTS: Final = 2
-"""Of so many links each part has an array of its own to add to; the number is fixed, so that sums are the
-same on any machine."""
 
 
 @kernel
@@ -83,20 +77,7 @@ def arriving_amplitudes(
     def add(start: int, stop: int, amplitude: FloatArray) -> None:
         _add_arriving(p, q, residual_p, residual_q, reflectance, radiosity, start, stop, amplitude)
 
-    return _summed(add, len(p), len(reflectance))
-
-
-def _summed(add: Callable[[int, int, FloatArray], None], links: int, elements: int) -> FloatArray:
-    """What ranges of links add to elements (n,): each part of them to an array of its own."""
-    parts = _PARTS if links >= _MANY else 1
-    total = np.zeros((parts, elements))
-
-    def work(start: int, stop: int) -> None:
-        for part in range(start, stop):
-            add(links * part // parts, links * (part + 1) // parts, total[part])
-
-    run_chunks(work, parts, 1)
-    return total[0] if parts == 1 else np.asarray(total.sum(axis=0))
+    return add_up(add, len(p), reflectance.shape)
 
 
 @kernel
@@ -194,7 +175,7 @@ def leaving_bias(
     def add(start: int, stop: int, bias: FloatArray) -> None:
         _add_leaving(p, q, residual_p, residual_q, tree.area, reflectance, spread, start, stop, bias)
 
-    bias = _summed(add, len(p), len(reflectance))
+    bias = add_up(add, len(p), reflectance.shape)
     _share_bias(tree.parent, tree.child, tree.child_count, tree.area, bias)
     return bias
 

@@ -25,12 +25,8 @@ from solver.parallel import run_chunks
 from solver.transport.elements import ElementTree
 from solver.transport.links import LinkTable
 from solver.transport.pace import finish
+from solver.transport.sums import add_up, part_count
 from solver.types import FloatArray, IntArray, Spectra
-
-_MANY: Final = 1 << 16
-_PARTS: Final = 2
-"""Of so many links each part has an array of its own to gather into; the number is fixed, so that sums are
-the same on any machine."""
 
 _AT_ONCE: Final = 1 << 18
 """Links gathered over between two yields."""
@@ -93,20 +89,12 @@ def collect(parent: IntArray, offset: FloatArray, closure: FloatArray, received:
     """Sum the parts of `received` (parts, n, 3, channels) in the first, push it down, scale by `closure`."""
     parts, n, _, channels = received.shape
     total = received[0]
-    for e in range(n):
-        up = parent[e]
-        for part in range(1, parts):
+    for part in range(1, parts):
+        for e in range(n):
             for k in range(3):
                 for c in range(channels):
                     total[e, k, c] += received[part, e, k, c]
-        if up < 0:
-            continue
-        for c in range(channels):
-            du = total[up, 1, c]
-            dv = total[up, 2, c]
-            total[e, 0, c] += total[up, 0, c] + offset[e, 0] * du + offset[e, 1] * dv
-            total[e, 1, c] += du
-            total[e, 2, c] += dv
+    push(parent, offset, total)
     for e in range(n):
         if closure[e] != 1.0:
             for k in range(3):
@@ -202,16 +190,12 @@ def patch_sums(tree: ElementTree, links: LinkTable, exchange: FloatArray, scale:
 
     `exchange` (m,) is that of the links.
     """
-    parts = _PARTS if len(links) >= _MANY else 1
-    total = np.zeros((parts, tree.patch_count))
 
-    def work(start: int, stop: int) -> None:
-        for part in range(start, stop):
-            first, last = len(links) * part // parts, len(links) * (part + 1) // parts
-            add_exchange(links.p, links.q, exchange, tree.patch, scale, first, last, total[part])
+    def add(start: int, stop: int, total: FloatArray) -> None:
+        add_exchange(links.p, links.q, exchange, tree.patch, scale, start, stop, total)
 
-    run_chunks(work, parts, 1)
-    return np.asarray(total.sum(axis=0) * scale / tree.area[: tree.patch_count])
+    total = add_up(add, len(links), (tree.patch_count,))
+    return np.asarray(total * scale / tree.area[: tree.patch_count])
 
 
 def irradiance_in_steps(
@@ -226,7 +210,7 @@ def irradiance_in_steps(
     """
     moments = np.empty_like(radiosity)
     pull(tree.child, tree.child_count, tree.area, tree.moment, tree.offset, radiosity, moments, closure)
-    parts = _PARTS if len(links) >= _MANY else 1
+    parts = part_count(len(links))
     received = np.zeros((parts, *radiosity.shape))
     exchange = links.exchange
 
