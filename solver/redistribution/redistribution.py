@@ -35,7 +35,7 @@ from solver.transport.estimate import SAFETY, ErrorEstimate, Residuals
 from solver.transport.field import RadiosityField, SolveOutcome
 from solver.transport.linking import Light
 from solver.transport.links import LinkBatch
-from solver.transport.pace import steps
+from solver.transport.pace import Pace, steps
 from solver.transport.refine import Choice, choose_above
 from solver.transport.settings import Interleaving, SolverSettings
 from solver.transport.solve import RadiositySolver
@@ -54,6 +54,9 @@ _ROUGHLY: Final = 0.1
 _FIRST_NOISE: Final = 64.0
 """Noise that links may have at first, of the error that is refined: the strongest ones get some light at
 once, and more rays when they are refined."""
+
+_FIRST_LOOKS: Final = 256.0
+"""Links looked at in the first batch: some milliseconds, of which the first frame after an edit has few"""
 
 _EARLY: Final = ((0.3, 8.0), (0.1, 1.0))
 """Shares of the energy at stake at which links are refined, while others are still to be looked at; and the
@@ -110,9 +113,8 @@ class Redistribution(RadiositySolver):
         owed = earlier.unlinked if isinstance(earlier, Redistribution) else UnlinkedPairs.none()
         self._unlinked = owed.carried(match).joined(self._fresh_pairs(match, number, earlier))
         self.bound = earlier.bound
-        if is_own:
-            # Of a solution that had settled it is that of other work.
-            self.pace = earlier.pace
+        # Of a solution that had settled it is that of other work.
+        self.pace = earlier.pace if is_own else Pace(_FIRST_LOOKS)
         self.linked = surfaces.patch_count
         self.lean: int = earlier.lean if isinstance(earlier, Redistribution) else len(earlier.state.links)
         """Links when all of them were last looked at for mergers"""

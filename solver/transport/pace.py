@@ -26,8 +26,9 @@ _MOST: Final = 32768.0
 class Pace:
     """Cuts ranges of work into batches; the time between two batches counts for the first of them."""
 
-    def __init__(self) -> None:
-        self._cost = _FIRST
+    def __init__(self, first: float = _FIRST) -> None:
+        """Begin with a batch of so many items, where each costs 1."""
+        self._cost = first
         self._away = 0.0
         self._left: float | None = None
         self._until = 0.0
