@@ -26,7 +26,12 @@ from solver.illumination.discontinuity.lines import Lines, find_lines
 from solver.illumination.interpolation.correction import corrected
 from solver.illumination.interpolation.interpolants import Interpolants
 from solver.illumination.interpolation.mesh import InterpolantMesh
-from solver.illumination.interpolation.refinement import ViewError, cells_to_split, view_error
+from solver.illumination.interpolation.refinement import (
+    ViewError,
+    cells_to_split,
+    has_urgent_cells,
+    view_error,
+)
 from solver.illumination.meshing.cells import Cells
 from solver.illumination.meshing.splitting import split_cells
 from solver.illumination.meshing.triangulation import Triangulation, triangulate_in_steps
@@ -241,6 +246,8 @@ class FineLight:
                 while interpolants.step():
                     self.version += 1
                     yield
+                    if interpolants.is_between and self._is_urgent(interpolants):
+                        break
                 finer = self._split(interpolants, cells)
                 if finer is cells:
                     self._is_resting = True
@@ -255,6 +262,10 @@ class FineLight:
         for pixels in self._seen.values():
             chosen |= cells_to_split(interpolants, pixels, tolerance)
         return split_cells(cells, chosen) if chosen.any() else cells
+
+    def _is_urgent(self, interpolants: Interpolants) -> bool:
+        tolerance = self._settings.interpolation_tolerance
+        return any(has_urgent_cells(interpolants, pixels, tolerance) for pixels in self._seen.values())
 
     def _look(self, interpolants: Interpolants) -> None:
         """Tell the interpolants what the cameras see."""

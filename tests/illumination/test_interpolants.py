@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from solver.illumination.interpolation.interpolants import Interpolants
-from solver.illumination.interpolation.refinement import cells_to_split, view_error
+from solver.illumination.interpolation.locating import told_at, triangles_at
+from solver.illumination.interpolation.refinement import cells_to_split, has_urgent_cells, view_error
 from solver.illumination.meshing.cells import Cells, ConstraintEdges
 from solver.illumination.meshing.splitting import split_cells
 from solver.illumination.meshing.triangulation import triangulate
-from tests.illumination.fine import build_all, interpolants_of, relative_error
+from solver.types import FloatArray
+from tests.illumination.fine import build_all, interpolants_of, relative_error, triangulated
 from tests.transport.solving import furnace, shelf, solved
 
 SHELF = solved(shelf(), 0.05)
@@ -78,6 +81,10 @@ def test_splitting_lowers_the_error_and_keeps_what_was_sampled() -> None:
         coarse._point, solver.state.tree.leaves, cells, mesh, solver.field().irradiance, coarse
     )
     assert 0 < fine.is_fine.sum() < len(fine.is_fine), "unsplit cells keep their samples"
+    assert relative_error(fine) < 1.1 * relative_error(coarse), "what was known between samples still shows"
+    told = view_error(fine, fine.area)
+    assert told.share_known < 1.0
+    assert told.relative == pytest.approx(view_error(coarse, coarse.area).relative, rel=0.1)
     build_all(fine)
     assert fine.evaluations < len(fine.sample_points()[0])
     assert relative_error(fine) < 0.8 * relative_error(coarse)
@@ -90,3 +97,46 @@ def test_nothing_is_split_within_the_tolerance_or_for_less_than_a_few_pixels() -
     assert not cells_to_split(interpolants, 1e-3 * pixels, 1e-4).any()
     assert not cells_to_split(interpolants, 0.0 * pixels, 1e-4).any()
     assert cells_to_split(interpolants, pixels, 1e-4).any()
+
+
+def test_few_cells_that_are_most_of_the_error_are_split_before_all_is_known() -> None:
+    interpolants = interpolants_of(SHELF)
+    pixels = np.full(len(interpolants.triangulation.triangles), 100.0)
+    assert not has_urgent_cells(interpolants, pixels, 1e-3), "nothing is known"
+    first = np.zeros_like(pixels)
+    first[: len(pixels) // 4] = 1.0
+    interpolants.want(first)
+    while interpolants.step():
+        assert not interpolants.is_between or interpolants.is_checked.any()
+    assert interpolants.is_between and not interpolants.is_checked.all()
+    known = view_error(interpolants, np.where(interpolants.is_checked, pixels, 0.0)).relative
+    assert has_urgent_cells(interpolants, pixels, 0.1 * known)
+    assert not has_urgent_cells(interpolants, pixels, 10.0 * known)
+
+
+def test_places_are_found_in_the_triangles_that_hold_them() -> None:
+    mesh = triangulated(SHELF)
+    random = np.random.default_rng(3)
+    which = random.integers(0, len(mesh.triangles), 200)
+    place = random.dirichlet(np.ones(3), 200)
+    position = np.einsum("nk,nka->na", place, mesh.position[mesh.triangles[which]])
+    triangle, found = triangles_at(mesh, position, mesh.leaf[which])
+    np.testing.assert_array_equal(triangle, which)
+    np.testing.assert_allclose(found, place[:, 1:], atol=1e-9)
+    none, _ = triangles_at(mesh, position[:1], np.array([mesh.leaf.max() + 7], dtype=np.int32))
+    assert none.tolist() == [-1]
+
+
+def test_quadratics_tell_between_samples_what_they_are_made_from() -> None:
+    random = np.random.default_rng(4)
+    coefficients = random.uniform(0.5, 1.0, (6, 3))
+
+    def quadratic(s: FloatArray, t: FloatArray) -> FloatArray:
+        return np.stack([s * s, s * t, s, t * t, t, np.ones_like(s)], axis=1) @ coefficients
+
+    values = quadratic(np.array([0.0, 0.5, 1.0, 0.5, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 0.5, 1.0, 0.5]))
+    place = random.dirichlet(np.ones(3), 50)[:, 1:]
+    node = np.arange(6, dtype=np.int32)[None]
+    told = told_at(node, values, np.zeros(50, dtype=np.int32), place)
+    np.testing.assert_allclose(told, quadratic(place[:, 0], place[:, 1]), rtol=1e-5)
+    np.testing.assert_array_equal(told_at(node, -values, np.zeros(50, dtype=np.int32), place), 0.0)

@@ -12,14 +12,16 @@ from hypothesis import given, settings
 
 from solver.document.samples import load_sample
 from solver.engine.world import World
-from solver.geometry.scene import Scene
+from solver.geometry.obstacles import ALONE, BOUNDS, Obstacles
+from solver.geometry.scene import Mesh, Scene, SceneObject
+from solver.illumination.points.gather_anywhere import MOST_AROUND
 from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.pathtracing import PathTracer
 from solver.transport.solve import RadiositySolver
 from solver.types import FloatArray, IntArray, Points
 from tests.accuracy.test_cube import points as tabled_points
 from tests.illumination.field_rays import reflected_irradiance
-from tests.pathtracing.worlds import material, polygon, square, world
+from tests.pathtracing.worlds import CUBE, OUTWARD, material, polygon, square, world
 from tests.transport.polygons import SEEDS, cases, rotation
 from tests.transport.solving import furnace, lit_cube, shelf, solved
 
@@ -354,3 +356,58 @@ def test_no_points_and_no_light() -> None:
         point = point_irradiance(dark, few=few)
         assert point.at(np.empty((0, 3)), np.empty(0, dtype=np.int32)).shape == (0, 1)
         np.testing.assert_array_equal(point.at(*spread(dark, 10)), 0.0)
+
+
+# --- what need not be asked ---
+
+
+def boxes(random: np.random.Generator, count: int) -> list[SceneObject]:
+    """Boxes that may stand on the floor, overlap and stick out of the unit cube."""
+    built = []
+    for k in range(count):
+        size = random.uniform(0.05, 0.5, 3)
+        low = random.uniform(0.0, 0.8, 3) * [1, 1, random.integers(0, 2)]
+        corners = low + CUBE * size
+        if k % 2:
+            corners = (corners - 0.5) @ rotation(int(random.integers(1 << 30))).T + 0.5
+        of = material(0.5, random.choice([0.0, 0.3]))
+        built.append(SceneObject(f"box{k}", Mesh(corners, OUTWARD), of))
+    return built
+
+
+@settings(max_examples=8)
+@given(seed=SEEDS)
+def test_faces_that_look_away_and_walls_hide_nothing_more(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    built = World.of(Scene(objects={o.id: o for o in [*lit_cube(0.3).scene, *boxes(random, 4)]}))
+    solver = solved(built, 0.3)
+    point = point_irradiance(solver, 1e-9)
+    asked = Obstacles(np.full(built.surfaces.patch_count, ALONE, dtype=np.int32), np.empty((0, BOUNDS)))
+    assert (point.obstacles.solid != ALONE).any()
+    of_all = replace(point, obstacles=asked)
+    positions, leaves = spread(solver, 60, seed)
+    np.testing.assert_allclose(
+        point.at(positions, leaves), of_all.at(positions, leaves), rtol=1e-6, atol=1e-9
+    )
+    loose, normals = random.uniform(-0.2, 1.2, (60, 3)), random.normal(size=(60, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    np.testing.assert_allclose(
+        point.anywhere(loose, normals), of_all.anywhere(loose, normals), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_what_is_beyond_the_walls_changes_nothing() -> None:
+    """With a heap of polygons there, blockers are found in the hierarchy, and a wall is none that has all of
+    the scene before it."""
+    lamps = [
+        replace(o, material=material(0.0, 1.0))
+        for o in [*lit_cube().scene, *boxes(np.random.default_rng(8), 3)]
+    ]
+    heap = [square(f"beyond{k}", material(0.5), 3.0 + 0.01 * k, down=bool(k % 2)) for k in range(MOST_AROUND)]
+    few, many = (
+        solved(World.of(Scene(objects={o.id: o for o in objects})), 0.9) for objects in (lamps, lamps + heap)
+    )
+    positions, leaves = spread(few, 100)
+    normals = few.surfaces.normal[few.state.tree.patch[leaves]]
+    alone, among = (point_irradiance(s).anywhere(positions, normals) for s in (few, many))
+    np.testing.assert_allclose(among, alone, rtol=1e-9, atol=1e-12)

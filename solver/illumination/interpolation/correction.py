@@ -18,11 +18,13 @@ import numpy as np
 from solver.illumination.points.point_irradiance import PointIrradiance
 from solver.transport.pace import Pace
 from solver.transport.state import TransportState
-from solver.types import FloatArray, IntArray, Spectra
+from solver.types import FloatArray, IntArray, Points, Spectra
 
 MOST_POINTS: Final = 4096
-"""Of more leaves so many are asked, by area; the others have the mean share of their patch. Of few, each is
-asked at several points."""
+"""Of more leaves so many are asked, by area; the others have the mean share of their patch."""
+
+_AGAIN: Final = 96
+"""If all leaves are asked, so many are at several points: those whose middle is off by most light."""
 
 _CORNERWARDS: Final = 1.0 / np.sqrt(3.0)
 """Points between the middle and the corners of a leaf, so far out that their mean is right for quadratics."""
@@ -61,20 +63,16 @@ def _defects(state: TransportState, point: PointIrradiance, told: Spectra) -> Ge
     asked = _spread_by_area(tree.area[leaves])
     chosen = leaves[asked]
     point = point.of_reflected()
-    middle = tree.centroid[chosen]
-    if 4 * len(leaves) <= MOST_POINTS:
-        # A triangle's last corner counts twice, which shifts the mean by little.
-        places = middle[:, None] + _CORNERWARDS * (tree.corners[chosen] - middle[:, None])
-    else:
-        places = middle[:, None]
-    each = places.shape[1]
-    positions, owner = np.ascontiguousarray(places.reshape(-1, 3)), np.repeat(chosen, each)
-    exact = np.empty((len(owner), state.channels))
-    for part in Pace().batches(np.ones(len(owner), dtype=np.int64)):
-        exact[part] = point.at(positions[part], owner[part])
-        yield
-    found = exact.reshape(-1, each, state.channels).mean(axis=1) - told[chosen]
+    found = (yield from _gather(point, tree.centroid[chosen][:, None], chosen)) - told[chosen]
     if len(asked) == len(leaves):
+        # Where the middle is off, it may not be what the leaf is off by.
+        weight = tree.area[chosen] * np.abs(found @ state.weights)
+        again = np.argsort(-weight, kind="stable")[:_AGAIN]
+        worst = chosen[again]
+        middle = tree.centroid[worst][:, None]
+        # A triangle's last corner counts twice, which shifts the mean by little.
+        places = middle + _CORNERWARDS * (tree.corners[worst] - middle)
+        found[again] = (yield from _gather(point, places, worst)) - told[worst]
         return np.asarray(found)
     patch, area = tree.patch, tree.area
     share = _ratio(
@@ -82,6 +80,17 @@ def _defects(state: TransportState, point: PointIrradiance, told: Spectra) -> Ge
         _by_patch(tree.patch_count, patch[chosen], area[chosen], told[chosen]),
     )
     return np.asarray(share[patch[leaves]] * told[leaves])
+
+
+def _gather(point: PointIrradiance, places: Points, leaves: IntArray) -> Generator[None, None, Spectra]:
+    """Mean irradiance (l, channels) over places (l, k, 3) on leaves (l,)."""
+    each = places.shape[1]
+    positions, owner = np.ascontiguousarray(places.reshape(-1, 3)), np.repeat(leaves, each)
+    exact = np.empty((len(owner), point.emission.shape[1]))
+    for part in Pace().batches(np.ones(len(owner), dtype=np.int64)):
+        exact[part] = point.at(positions[part], owner[part])
+        yield
+    return np.asarray(exact.reshape(-1, each, exact.shape[1]).mean(axis=1))
 
 
 def _spread_by_area(area: FloatArray) -> IntArray:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from solver.illumination.interpolation.fit import fit_interpolants
+from solver.illumination.interpolation.locating import told_at, triangles_at
 from solver.illumination.interpolation.matching import find_places
 from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.illumination.interpolation.samples import Samples, in_channels, linear_samples, place_samples
@@ -73,6 +74,8 @@ class Interpolants:
         self._wanted = np.zeros(t)
         self._pace = Pace()
         self._mesh: InterpolantMesh | None = None
+        self._expected = np.full(t, np.nan)
+        """Error of what triangles have taken from those that were in their place, NaN where there are none"""
         self.evaluations = 0
         """Point irradiances computed."""
         if before is not None:
@@ -80,6 +83,8 @@ class Interpolants:
         self._error = np.zeros(t)
         self._mean = np.zeros(t)
         self._measure(np.arange(t, dtype=np.int32))
+        self.is_between = False
+        """Whether all that has been sampled has been checked, too"""
         self._work = self._run()
 
     # --- what it holds -------------------------------------------------------------------------------
@@ -114,8 +119,9 @@ class Interpolants:
     def errors(self) -> FloatArray:
         """(t,) estimated RMS error of the luminance irradiance over each triangle, W/m2.
 
-        Of triangles not yet checked, as much as they curve. Who waits for a frame asks often: both this and
-        the mean are kept, and brought up to date for the triangles that are worked on.
+        Of triangles not yet checked, what those that were in their place err by, or as much as they curve.
+        Who waits for a frame asks often: both this and the mean are kept, and brought up to date for the
+        triangles that are worked on.
         """
         return self._error
 
@@ -153,6 +159,7 @@ class Interpolants:
             if triangles is None:
                 yield False
                 continue
+            self.is_between = False
             nodes = np.unique(self._samples.node[triangles])
             nodes = nodes[~self._exact[nodes]].astype(np.int32)
             leaf = self.triangulation.leaf
@@ -171,6 +178,7 @@ class Interpolants:
                 self._checked[chosen] = True
                 self._measure(chosen)
                 self._changed(len(chosen))
+                self.is_between = part.stop == len(triangles)
                 yield True
 
     def _next_triangles(self) -> IntArray | None:
@@ -188,7 +196,9 @@ class Interpolants:
         middle = (4.0 * r[:, 1::2].sum(axis=1) - r[:, 0::2].sum(axis=1)) / 9.0
         found = _MIDDLE * np.abs(middle - self._check[triangles] @ self._point.weights)
         curved = np.abs(r[:, 1::2] - 0.5 * (r[:, 0::2] + r[:, [2, 4, 0]])).max(axis=1)
-        self._error[triangles] = np.where(self._checked[triangles], found, curved)
+        expected = self._expected[triangles]
+        untold = np.where(np.isnan(expected), curved, expected)
+        self._error[triangles] = np.where(self._checked[triangles], found, untold)
         self._mean[triangles] = r[:, 1::2].mean(axis=1)
 
     def _changed(self, evaluations: int) -> None:
@@ -197,7 +207,7 @@ class Interpolants:
         self._mesh = None
 
     def _take_over(self, before: Interpolants) -> None:
-        """Keep what has been sampled at the very same places."""
+        """Keep what has been sampled at the very same places, and what was told between them."""
         mine, theirs = self.triangulation.patch, before.triangulation.patch
         found, at = find_places(
             before._samples.position,
@@ -213,6 +223,15 @@ class Interpolants:
         found[found] = before._checked[at[found]]
         self._check[found] = before._check[at[found]]
         self._checked[found] = self._exact[self._samples.node[found]].all(axis=1)
+        leaf = self.triangulation.leaf
+        new = np.flatnonzero(~self._exact)
+        triangle, place = triangles_at(
+            before.triangulation, self._samples.position[new], leaf[self._samples.triangle[new]]
+        )
+        self._values[new] = told_at(before.nodes, before._values, triangle, place)
+        new = np.flatnonzero(~self._checked)
+        triangle, _ = triangles_at(before.triangulation, self._middle[new], leaf[new])
+        self._expected[new] = before.errors()[triangle]
 
     def follow(self, before: Interpolants, number: IntArray, doubt: FloatArray) -> int:
         """Go on from the interpolants of an earlier revision; returns how many samples stand for exact ones.

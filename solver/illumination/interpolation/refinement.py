@@ -25,6 +25,9 @@ _LEAST_PIXELS: Final = 6.0
 _AIM: Final = 0.7
 """Part of the tolerance that splitting aims at."""
 
+_URGENT: Final = 0.5
+"""Part of the tolerance that cells must err by to be split before all others are known."""
+
 _RESOLVED: Final = 0.9
 """Share of a cell's squared error that splitting takes away: quadratics err by the third power of size."""
 
@@ -52,15 +55,28 @@ def view_error(interpolants: Interpolants, pixels: FloatArray) -> ViewError:
 
 def cells_to_split(interpolants: Interpolants, pixels: FloatArray, tolerance: float) -> BoolArray:
     """(n,) cells whose interpolants err too much for an RMS error of `tolerance` over the `pixels` (t,)."""
+    chosen, _ = _choose(interpolants, pixels, tolerance)
+    return chosen
+
+
+def has_urgent_cells(interpolants: Interpolants, pixels: FloatArray, tolerance: float) -> bool:
+    """Whether those to split are most of the error, before all that the `pixels` (t,) see is checked."""
+    _, share = _choose(interpolants, pixels, tolerance)
+    return share > _URGENT**2
+
+
+def _choose(interpolants: Interpolants, pixels: FloatArray, tolerance: float) -> tuple[BoolArray, float]:
+    """(n,) cells to split by what is checked, and their squared RMS error relative to squared `tolerance`."""
     n = len(interpolants.cells.patch)
     cell = interpolants.triangulation.cell
     weight = np.where(interpolants.is_checked, pixels, 0.0)
-    light = np.bincount(cell, weight * interpolants.mean_luminance() ** 2, n)
+    brightness = interpolants.mean_luminance() ** 2
+    light = np.bincount(cell, weight * brightness, n)
     error = np.bincount(cell, weight * interpolants.errors() ** 2, n)
     seen = np.bincount(cell, weight, n)
-    total = float(light.sum())
+    total = float((pixels * brightness).sum())
     if total <= 0.0:
-        return np.zeros(n, dtype=np.bool_)
+        return np.zeros(n, dtype=np.bool_), 0.0
     large = seen > _LEAST_PIXELS
     chosen = large & (error > (LOCAL * tolerance) ** 2 * light)
     left = float(error.sum()) - _RESOLVED * float(error[chosen].sum())
@@ -71,4 +87,5 @@ def cells_to_split(interpolants: Interpolants, pixels: FloatArray, tolerance: fl
         gained = _RESOLVED * np.cumsum(error[order])
         count = int(np.searchsorted(gained, left - goal)) + 1
         chosen[order[:count]] = True
-    return np.asarray(chosen & (error > 0.0))
+    chosen &= error > 0.0
+    return chosen, float(error[chosen].sum()) / (tolerance**2 * total)

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from solver import tolerances
+from solver.geometry.obstacles import find_obstacles
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.points.cuts import ABOVE, ROOM, WHOLE, clip_above
 from solver.illumination.points.desk import Elements, Light, make_desk, relative_polygon
@@ -102,10 +103,11 @@ def backproject(
 def _undivided(surfaces: Surfaces) -> Elements:
     """Patches as elements, for a walk that enters none and weighs none."""
     n = surfaces.patch_count
+    obstacles = find_obstacles(surfaces)
     none, number = np.full(n, -1, dtype=np.int32), np.arange(n, dtype=np.int32)
     return Elements(
         none, none, surfaces.corners, surfaces.corner_count, number, np.empty((0, 3)), np.empty((0, 2, 3)),
-        surfaces.normal,
+        surfaces.normal, obstacles.solid, obstacles.bounds,
     )  # fmt: skip
 
 
@@ -153,9 +155,12 @@ def _backproject(
     desk = make_desk(len(order))
     buffers = desk.buffers
     work = buffers.work
-    sight = make_sight(elements.corners[:patches], elements.corner_count[:patches], elements.normals)
+    sight = make_sight(
+        elements.corners[:patches], elements.corner_count[:patches], elements.normals, elements.solid,
+        elements.bounds,
+    )  # fmt: skip
     planes = np.empty((PLANES, 4))
-    found, _ = seen_sources(x, normal, elements, light, source_tolerance, desk, sources)
+    found, _ = seen_sources(x, normal, elements, light, source_tolerance, desk, sources, np.empty(patches))
     for k in range(found):
         p = sources[k]
         sides = elements.corner_count[p]
@@ -172,8 +177,8 @@ def _backproject(
         factors[k, 0] = factor_of(work, ABOVE, count, normal)
         kept = cull(
             x, 0, normal, work, ABOVE, count, desk.pyramid, 0, sides, desk.pool, 0, near, sight.corners,
-            sight.sides, sight.normals, sight.pyramids, sight.cones, sight.raised, blocker_tolerance,
-            desk.pool, near,
+            sight.sides, sight.normals, sight.pyramids, sight.cones, sight.spheres, sight.seen, sight.raised,
+            sight.solid, sight.bounds, blocker_tolerance, desk.pool, near,
         )  # fmt: skip
         factors[k, 1] = 0.0
         visible = 0

@@ -36,6 +36,10 @@ class Elements(NamedTuple):
     """(p, 2, 3)"""
     normals: FloatArray
     """(p, 3)"""
+    solid: IntArray
+    """(p,) what patches are, as `Obstacles` has it"""
+    bounds: FloatArray
+    """(s, BOUNDS) of the solids"""
 
 
 class Light(NamedTuple):

@@ -69,7 +69,10 @@ def gather_over_links(
     """
     patches = len(elements.normals)
     desk = make_desk(most_blockers)
-    sight = make_sight(elements.corners[:patches], elements.corner_count[:patches], elements.normals)
+    sight = make_sight(
+        elements.corners[:patches], elements.corner_count[:patches], elements.normals, elements.solid,
+        elements.bounds,
+    )  # fmt: skip
     for i in range(start, stop):
         x = positions[i]
         normal = normals[i]
@@ -151,7 +154,8 @@ def _lamp_factor(
             kept = cull(
                 x, point, normal, buffers.work, ABOVE, count, desk.pyramid, 0, sides, lamps.pool, first,
                 first + lamps.blocker_count[row], sight.corners, sight.sides, sight.normals, sight.pyramids,
-                sight.cones, sight.raised, tolerance, desk.pool, 0,
+                sight.cones, sight.spheres, sight.seen, sight.raised, sight.solid, sight.bounds, tolerance,
+                desk.pool, 0,
             )  # fmt: skip
         if kept == 0:
             factor = factor_of(buffers.work, ABOVE, count, normal)

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from solver import tolerances
+from solver.geometry.obstacles import Obstacles, find_obstacles
 from solver.geometry.surfaces import Surfaces
 from solver.illumination.points.desk import Elements, Light
 from solver.illumination.points.gather_anywhere import gather_anywhere
@@ -53,6 +54,7 @@ class PointIrradiance:
 
     surfaces: Surfaces
     hierarchy: Hierarchy
+    obstacles: Obstacles
     accuracy: float
     tree: ElementTree
     links: LinkTable
@@ -108,6 +110,7 @@ class PointIrradiance:
         return PointIrradiance(
             surfaces=state.surfaces,
             hierarchy=hierarchy,
+            obstacles=find_obstacles(state.surfaces),
             accuracy=accuracy,
             tree=tree,
             links=state.links,
@@ -152,12 +155,13 @@ class PointIrradiance:
         """
         h, size = self.hierarchy, self.surfaces.size
         elements, light = self._elements(), _light(self.light)
+        shines = np.asarray(self.emission.any(axis=1))
         out = np.empty((len(positions), self.emission.shape[1]))
 
         def work(start: int, stop: int) -> None:
             gather_anywhere(
                 positions, normals, self.accuracy, h.low, h.high, h.skip, h.first, h.count, h.order, elements,
-                light, tolerances.SIDE * size, ON_SURFACE * size, ON_PLANE * size, start, stop, out,
+                light, shines, tolerances.SIDE * size, ON_SURFACE * size, ON_PLANE * size, start, stop, out,
             )  # fmt: skip
 
         run_chunks(work, len(positions), _CHUNK, 1)
@@ -198,7 +202,7 @@ class PointIrradiance:
         tree = self.tree
         return Elements(
             tree.child, tree.child_count, tree.corners, tree.corner_count, tree.patch, tree.centroid,
-            tree.axes, tree.patch_normal,
+            tree.axes, tree.patch_normal, self.obstacles.solid, self.obstacles.bounds,
         )  # fmt: skip
 
     def solved(self, positions: Points, elements: IntArray) -> Spectra:

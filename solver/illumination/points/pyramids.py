@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from solver.geometry.obstacles import is_needless
 from solver.kernels import inline_kernel, kernel
 from solver.types import Corners, Float32Array, FloatArray, Int64Array, IntArray
 
@@ -38,7 +39,7 @@ HIDDEN: Final = -1
 _ROUNDING: Final = 1e-15
 """By how much more than they must the cosine of two axes has to differ for their cones to be apart."""
 
-_NEARLY: Final = np.float32(4e-6)
+NEARLY: Final = np.float32(4e-6)
 """As much for cones in few digits."""
 
 _WIDEST: Final = np.float32(0.99999)
@@ -214,21 +215,45 @@ class Sight(NamedTuple):
     """(b, PYRAMID)"""
     cones: Float32Array
     """(b, 5) their cones alone: axis, sine and cosine of half the angle, so that all fit the nearest cache"""
+    spheres: FloatArray
+    """(b, 4) around them: middle and radius, metres"""
+    seen: Int64Array
+    """(b,) for which point there is a cone"""
     raised: Int64Array
-    """(b,) for which point"""
+    """(b,) for which point there is a pyramid"""
+    solid: IntArray
+    """(b,) what they are, as `Obstacles` has it"""
+    bounds: FloatArray
+    """(s, BOUNDS) of the solids"""
 
 
 @kernel
-def make_sight(corners: Corners, sides: IntArray, normals: FloatArray) -> Sight:
+def make_sight(
+    corners: Corners, sides: IntArray, normals: FloatArray, solid: IntArray, bounds: FloatArray
+) -> Sight:
     """Of polygons that no point has seen."""
     b = len(normals)
+    spheres = np.zeros((b, 4))
+    for polygon in range(b):
+        for axis in range(3):
+            for k in range(sides[polygon]):
+                spheres[polygon, axis] += corners[polygon, k, axis] / sides[polygon]
+        for k in range(sides[polygon]):
+            square = 0.0
+            for axis in range(3):
+                square += (corners[polygon, k, axis] - spheres[polygon, axis]) ** 2
+            spheres[polygon, 3] = max(spheres[polygon, 3], math.sqrt(square))
     return Sight(
         corners,
         sides,
         normals,
         np.empty((b, PYRAMID)),
         np.empty((b, 5), dtype=np.float32),
+        spheres,
         np.full(b, -1, dtype=np.int64),
+        np.full(b, -1, dtype=np.int64),
+        solid,
+        bounds,
     )
 
 
@@ -266,12 +291,40 @@ def _stands_aside(
 
 
 @inline_kernel
-def _copy_cone(pyramids: FloatArray, row: int, cones: Float32Array) -> None:
-    """A pyramid's cone in few digits; from within it, one that nothing is aside of."""
-    for column in range(5):
-        cones[row, column] = pyramids[row, AXIS + column]
-    if cones[row, 3] >= _WIDEST:
-        cones[row, 4] = -_ALL_AROUND
+def look_at(
+    x: FloatArray,
+    polygon: int,
+    corners: Corners,
+    normals: FloatArray,
+    spheres: FloatArray,
+    solid: IntArray,
+    bounds: FloatArray,
+    tolerance: float,
+    cones: Float32Array,
+) -> bool:
+    """A polygon's cone in few digits, from a point (3,); True if it hides nothing that others do not.
+
+    From within the cone, it is one that nothing is aside of; of what hides nothing, one that all is aside of.
+    """
+    distance = 0.0
+    for axis in range(3):
+        distance += normals[polygon, axis] * (corners[polygon, 0, axis] - x[axis])
+    needless = abs(distance) <= tolerance
+    needless = needless or is_needless(x, distance > 0.0, solid[polygon], bounds, tolerance)
+    cx = spheres[polygon, 0] - x[0]
+    cy = spheres[polygon, 1] - x[1]
+    cz = spheres[polygon, 2] - x[2]
+    ax, ay, az, sine, cosine = _cone_around(cx, cy, cz, spheres[polygon, 3])
+    cones[polygon, 0] = ax
+    cones[polygon, 1] = ay
+    cones[polygon, 2] = az
+    cones[polygon, 3] = 0.0 if needless else sine
+    cones[polygon, 4] = cosine
+    if needless:
+        cones[polygon, 4] = _ALL_AROUND
+    elif sine >= _WIDEST:
+        cones[polygon, 4] = -_ALL_AROUND
+    return needless
 
 
 @kernel
@@ -293,7 +346,11 @@ def cull(
     normals: FloatArray,
     pyramids: FloatArray,
     cones: Float32Array,
+    spheres: FloatArray,
+    seen: Int64Array,
     raised: Int64Array,
+    solid: IntArray,
+    bounds: FloatArray,
     tolerance: float,
     out: IntArray,
     used: int,
@@ -301,7 +358,7 @@ def cull(
     """Which of blockers[first : stop] may hide some of a source from a point x (3,), to out[used:].
 
     The source's part above the horizon is a row of polygons (s, n, 3), relative to x; its own pyramid is a
-    row of sources (p, PYRAMID). corners ... raised are those of a `Sight`; `point` is the number of x, what
+    row of sources (p, PYRAMID). corners ... bounds are those of a `Sight`; `point` is the number of x, what
     is raised for another is raised anew. Returns how many there are, or HIDDEN.
     """
     ax, ay, az, sine, cosine, sliver = cone_of(polygons, slot, count)
@@ -310,15 +367,19 @@ def cull(
     kept = 0
     for b in range(first, stop):
         blocker = blockers[b]
-        if raised[blocker] != point:
-            raise_pyramid(x, corners, blocker, sides[blocker], normals, blocker, tolerance, pyramids, blocker)
-            _copy_cone(pyramids, blocker, cones)
-            raised[blocker] = point
+        if seen[blocker] != point:
+            if look_at(x, blocker, corners, normals, spheres, solid, bounds, tolerance, cones):
+                pyramids[blocker, DISTANCE] = 0.0
+                raised[blocker] = point
+            seen[blocker] = point
         # Most are aside, and few digits tell.
-        limit = nearly_cosine * cones[blocker, 4] - nearly_sine * cones[blocker, 3] - _NEARLY
+        limit = nearly_cosine * cones[blocker, 4] - nearly_sine * cones[blocker, 3] - NEARLY
         along = nearly_x * cones[blocker, 0] + nearly_y * cones[blocker, 1] + nearly_z * cones[blocker, 2]
         if along < limit and nearly_sine < _WIDEST:
             continue
+        if raised[blocker] != point:
+            raise_pyramid(x, corners, blocker, sides[blocker], normals, blocker, tolerance, pyramids, blocker)
+            raised[blocker] = point
         cut = CLEAR
         if not cones_part(ax, ay, az, sine, cosine, pyramids, blocker):
             cut = sides_cut(polygons, slot, count, pyramids, blocker, sides[blocker], tolerance, sliver)

@@ -133,7 +133,7 @@ def _quarter(
 
 
 @kernel
-def _add(
+def add_from(
     x: FloatArray,
     e: int,
     p: int,
@@ -217,7 +217,11 @@ def add_waiting(
     blocker_normals = sight.normals
     pyramids = sight.pyramids
     cones = sight.cones
+    spheres = sight.spheres
+    seen_cones = sight.seen
     raised = sight.raised
+    solid = sight.solid
+    bounds = sight.bounds
     spare = len(pool) - len(stack_corners) // PER_BLOCKER
     while top > 0:
         lanes = min(top, LANES)
@@ -274,8 +278,8 @@ def add_waiting(
                 begin = -1 - first if first < 0 else first
                 kept = cull(
                     x, point, normal, work, ABOVE, count, pyramid, 0, sides, lists, begin, begin + blockers,
-                    blocker_corners, blocker_sides, blocker_normals, pyramids, cones, raised, tolerance, pool,
-                    used,
+                    blocker_corners, blocker_sides, blocker_normals, pyramids, cones, spheres, seen_cones,
+                    raised, solid, bounds, tolerance, pool, used,
                 )  # fmt: skip
                 if kept == HIDDEN:
                     factor = 0.0
@@ -311,5 +315,5 @@ def add_waiting(
                         _weigh(normal, normals, p, parts, part, part_count[part], place)
                 elif is_cut:
                     _weigh(normal, normals, p, work, ABOVE, count, place)
-                _add(x, e, p, factor, place, centroid, axes, functions, out, point)
+                add_from(x, e, p, factor, place, centroid, axes, functions, out, point)
     return allowance
