@@ -19,7 +19,8 @@ UNIT = box((0, 0, 0), (1, 1, 1))
 
 def kinds(*shapes: Points, without: tuple[int, ...] = (), triangulated: bool = False) -> list[int]:
     built = [solid(f"s{k}", shape, without, triangulated) for k, shape in enumerate(shapes)]
-    return find_obstacles(surfaces_of(*built)).solid.tolist()
+    found: list[int] = find_obstacles(surfaces_of(*built)).solid.tolist()
+    return found
 
 
 @pytest.mark.parametrize("triangulated", [False, True])
