@@ -24,6 +24,7 @@ from solver.errors import SolverError
 from solver.geometry.scene import Camera
 from solver.illumination.discontinuity.lines import Lines, find_lines
 from solver.illumination.interpolation.correction import corrected
+from solver.illumination.interpolation.following import Following
 from solver.illumination.interpolation.interpolants import Interpolants
 from solver.illumination.interpolation.mesh import InterpolantMesh
 from solver.illumination.interpolation.refinement import (
@@ -92,6 +93,7 @@ class FineLight:
         self._interpolants: Interpolants | None = None
         self._lines: Lines | None = None
         self._point: PointIrradiance | None = None
+        self._following: Following | None = None
         self._evaluations = 0
         self._is_resting = False
         self._is_preparing = False
@@ -158,6 +160,18 @@ class FineLight:
         if self._interpolants is None or not self._is_resting or self.failure is not None:
             return checkpoint
         return with_interpolants(checkpoint, self._interpolants, self._settings)
+
+    def following(self) -> Following | None:
+        """What can be shown of the interpolants after an edit; None where there are none.
+
+        Made ready when they are complete, so that the first frame after the edit need not wait for it.
+        """
+        if self._interpolants is None:
+            return None
+        known = self._following
+        if known is None or not known.is_of(self._interpolants):
+            known = self._following = Following(self._interpolants, self._solver.state)
+        return known
 
     # --- the work ------------------------------------------------------------------------------------
 
@@ -250,6 +264,7 @@ class FineLight:
                         break
                 finer = self._split(interpolants, cells)
                 if finer is cells:
+                    self.following()
                     self._is_resting = True
                     yield
             cells = finer

@@ -53,7 +53,5 @@ class FollowedLight:
 
 def follow(fine: FineLight) -> FollowedLight | None:
     """Let interpolants follow, before an edit takes over their solution; None where there are none."""
-    interpolants, solver = fine.interpolants, fine.solution.solver
-    if interpolants is None or not isinstance(solver, RadiositySolver):
-        return None
-    return FollowedLight(Following(interpolants, solver.state))
+    following = fine.following()
+    return None if following is None else FollowedLight(following)

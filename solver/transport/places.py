@@ -85,6 +85,9 @@ def _descend(
                 if depth > best:
                     best = depth
                     chosen = part
+                if depth > 0.0:
+                    # Within it, and so in no other.
+                    break
             element = chosen
         found[i] = element
 

@@ -70,6 +70,7 @@ class Following:
         """`state` is the settled solution that `before` are of, without what links missed."""
         tree, mesh = state.tree, before.triangulation
         self._before = before
+        self._version = before.version
         self._position, values, _ = before.sample_points()
         # Of the leaf that is found there now, too, where several meet.
         leaves = leaves_at(tree, self._position, mesh.patch[before.samples.triangle])
@@ -84,6 +85,10 @@ class Following:
     def interpolants(self) -> Interpolants:
         """What follows."""
         return self._before
+
+    def is_of(self, interpolants: Interpolants) -> bool:
+        """Whether what follows is `interpolants` as they stand."""
+        return interpolants is self._before and interpolants.version == self._version
 
     def follow(self, state: TransportState, number: IntArray, doubt: FloatArray) -> Followed:
         """What is to be shown by the light of `state`, as far as it has come.
