@@ -85,7 +85,7 @@ def _stages(engine: Engine, clock: Clock) -> tuple[float, ...]:
 
 def _reached(engine: Engine) -> int:
     """How many of the first five milestones are past."""
-    fine = engine._fine
+    fine = engine._showing.fine
     if engine._solution.state is SessionState.SOLVING:
         return 1
     if fine is None or fine.point_irradiance is None:

@@ -11,59 +11,43 @@ import gc
 import secrets
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from solver.document.edits import Edit, apply_edits
 from solver.document.limits import SceneLimits
-from solver.engine.auto import AutoView, renderers_for
+from solver.engine.auto import AutoView
 from solver.engine.change_log import ChangeLog, Progress
 from solver.engine.checkpoint import Checkpoint
-from solver.engine.checkpoint_fine import interpolants_alone
-from solver.engine.drawing import BEST_RENDERER, WITHOUT_LINKS, Drawing
+from solver.engine.drawing import Drawing
 from solver.engine.exports.files import Export, ExportRequest, encode_export
-from solver.engine.fine import FineLight
-from solver.engine.followed import FollowedLight, follow
 from solver.engine.frame_times import FrameTimes
-from solver.engine.gathers import GatherFrames
 from solver.engine.grids import Grid, GridRequest, grid_of
 from solver.engine.history import Step, step_of
-from solver.engine.instant.frames import InstantFrames
 from solver.engine.lightmaps.bake import Bake, LightmapRequest
 from solver.engine.lightmaps.begin import begin_bake
 from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.past import Past
-from solver.engine.paths import PathFrames
 from solver.engine.picking import PickResult, pick_point
 from solver.engine.probing import light_at
 from solver.engine.requests import (
     CameraChoice,
     FrameLimits,
     FrameRequest,
-    LayerName,
-    NotAvailableError,
-    RendererName,
 )
 from solver.engine.savings import savings_of
-from solver.engine.seen import SeenErrors
+from solver.engine.showing import Showing, renderer_of
 from solver.engine.solution import Solution
-from solver.engine.status import Change, ChangeState, EngineStatus, FineStatistics, ProbeResult, SessionState
+from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
 from solver.engine.views import (
     Frame,
-    GatherView,
-    InstantView,
-    InterpolantView,
     Outlook,
-    PathView,
-    SolutionView,
     View,
 )
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
-from solver.geometry.scene import Camera, Scene
-from solver.illumination.particles.compensation import Known
+from solver.geometry.scene import Scene
 from solver.illumination.settings import LightSettings
 from solver.redistribution.memory import Memory
 from solver.redistribution.redistribution import Redistribution
@@ -76,10 +60,6 @@ _FIRST_LOOK: Final = 0.02
 
 _GLANCE: Final = 0.012
 """The same in the midst of a drag, where the next frame is soon asked for"""
-
-_MEANWHILE: Final = 2.5e-8
-"""Seconds of work in the midst of a drag while a frame is drawn, a pixel and sample: software OpenGL takes at
-least that long, and leaves cores idle"""
 
 
 class Engine:
@@ -103,22 +83,15 @@ class Engine:
         past = scene if isinstance(scene, Past) else Past(scene)
         self._limits = limits or SceneLimits()
         self._history, standing = past.history(self._limits)
-        self._frame_limits = frame_limits or FrameLimits()
         self._settings = settings or LightSettings()
         self._drawing = drawing or Drawing()
-        self._fine: FineLight | None = None
-        self._gathers: GatherFrames | None = None
-        self._instant: InstantFrames | None = None
         self._revision = past.revision
         self._log = ChangeLog(past.entries, past.count, past.drags)
         self._life = secrets.token_hex(4)
         """Sets the tags of its frames apart from those that the session had in an earlier process"""
         self._turn = 0
         self._memory = Memory()
-        self._seen_errors = SeenErrors()
         self.frame_times = FrameTimes()
-        self._followed: FollowedLight | None = None
-        """The last interpolants, if what has happened to the light since then is traced"""
         self._moved: ObjectId | None = None
         """What the edits since the last transition, or those of it, have moved, if nothing else"""
         self._drags = False
@@ -130,7 +103,13 @@ class Engine:
         """Whether what the solution was halted for is still held by it"""
         self._power: dict[ObjectId, float] = {}
         """W of luminance that left each object before the last transition that goes on with no drag"""
-        self._settle(World.of(standing, in_colour=_in_colour(self._settings)), None, False, kept)
+        self._world = World.of(standing, in_colour=_in_colour(self._settings))
+        self._solution = Solution(
+            self._world, self._settings, None, self._revision, False, self._memory, False, kept
+        )
+        self._showing = Showing(
+            self._world, self._solution, self._settings, self._drawing, frame_limits or FrameLimits(), kept
+        )
 
     @property
     def scene(self) -> Scene:
@@ -186,7 +165,7 @@ class Engine:
         earlier = None if self._is_outgrown else self._solution
         before, self._settings, self._halted = self._settings, settings, None
         if settings.solves_as(before):
-            self._fine, self._gathers, self._instant = None, None, None
+            self._showing.configure(settings)
             self._turn += 1
         else:
             self._settle(World.of(self.scene, self._world, _in_colour(settings)), earlier, False)
@@ -204,13 +183,8 @@ class Engine:
             return False
         self._catch_up()
         solving = self._solution.state is SessionState.SOLVING
-        refining = self._fine is not None and self._fine.step(0.5 * budget)
-        gathering = self._gathers is not None and self._gathers.step(0.5 * budget)
-        busy = solving or refining or gathering
-        share = 0.5 * budget if busy else budget
-        tracing = self._paths.step(share, self._settings.error_tolerance)
-        if self._instant is not None:
-            tracing = self._instant.step(share, self._settings.error_tolerance) or tracing
+        busy = self._showing.refine(0.5 * budget) or solving
+        tracing = self._showing.trace(0.5 * budget if busy else budget)
         remembering = self._solution.step(0.5 * budget if tracing else budget)
         return busy or tracing or remembering
 
@@ -225,8 +199,7 @@ class Engine:
     def build_everything(self) -> None:
         """Build the interpolants of all triangles, seen or not, once there are any."""
         self._catch_up()
-        if self._fine is not None and self._fine.interpolants is not None:
-            self._fine.build(np.arange(len(self._fine.interpolants.triangulation.triangles), dtype=np.int32))
+        self._showing.build_everything()
 
     def status(self) -> EngineStatus:
         """How the session stands."""
@@ -240,8 +213,8 @@ class Engine:
             error_estimate=solution.error_estimate,
             unshot_fraction=solver.unshot_fraction,
             statistics=solver.statistics(),
-            fine=FineStatistics() if self._fine is None else self._fine.statistics(),
-            savings=savings_of(solution, self._fine),
+            fine=self._showing.statistics(),
+            savings=savings_of(solution, self._showing.fine),
             warnings=self._warnings(),
             settings=self._settings,
         )
@@ -252,7 +225,8 @@ class Engine:
         return SessionState.PAUSED if is_halted else state
 
     def _warnings(self) -> tuple[str, ...]:
-        failure = None if self._fine is None else self._fine.failure
+        fine = self._showing.fine
+        failure = None if fine is None else fine.failure
         told = (*self.scene.notes, *self._solution.warnings, failure, self._halted)
         return tuple(warning for warning in told if warning is not None)
 
@@ -281,7 +255,7 @@ class Engine:
         """Measure the light at points (n, 3) with normals (n, 3) of any length, as `light_at` does."""
         self._catch_up()
         unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        found, error = light_at(self._solution, self._fine_light(), self._settings, positions, unit)
+        found, error = light_at(self._solution, self._showing.fine_light(), self._settings, positions, unit)
         return ProbeResult(
             revision=self._revision,
             irradiance=found,
@@ -311,8 +285,8 @@ class Engine:
         LimitExceededError, RenderingUnavailableError.
         """
         self._catch_up()
-        chosen = self._camera(camera)
-        fine = self._fine_light()
+        chosen = self._showing.camera(camera)
+        fine = self._showing.fine_light()
         mesh = None if fine is None else fine.mesh()
         point = pick_point(self._solution, mesh, self._drawing, chosen, x, y)
         return PickResult(self._revision, point)
@@ -339,7 +313,7 @@ class Engine:
         """
         self._catch_up()
         self._solution.lend()
-        return begin_bake(request, self._revision, self._solution, self._fine_light(), self._settings)
+        return begin_bake(request, self._revision, self._solution, self._showing.fine_light(), self._settings)
 
     def _subject(self, request: OverlayRequest) -> Subject:
         return Subject(
@@ -347,104 +321,35 @@ class Engine:
             world=self._world,
             solution=self._solution,
             drawing=self._drawing,
-            fine=self._fine_light(),
-            camera=self._camera(request.camera),
+            fine=self._showing.fine_light(),
+            camera=self._showing.camera(request.camera),
         )
-
-    def _camera(self, choice: CameraChoice) -> Camera:
-        camera = choice.resolve(self.scene)
-        self._frame_limits.check(camera, 1)
-        return camera
 
     def checkpoint(self) -> Checkpoint | None:
         """The solution as it is to be kept, and what is built on it, if that is complete; None while it does
         not rest. Good until the next edit."""
         found = None if self._is_behind else self._solution.checkpoint()
-        return found if found is None or self._fine is None else self._fine.kept(found)
+        fine = self._showing.fine
+        return found if found is None or fine is None else fine.kept(found)
 
-    def _settle(
-        self, world: World, earlier: Solution | None, drags: bool, kept: Checkpoint | None = None
-    ) -> None:
-        """Let light settle in `world`, anew or from what it was `earlier`, or was `kept`."""
-        seen = None if self._fine is None else follow(self._fine)
+    def _settle(self, world: World, earlier: Solution | None, drags: bool) -> None:
+        """Let light settle in `world`, anew or from what it was `earlier`."""
+        left = self._showing.leave()
         solution = Solution(
-            world, self._settings, earlier, self._revision, drags, self._memory, seen is not None, kept
+            world, self._settings, earlier, self._revision, drags, self._memory, left is not None
         )
-        self._kept = None if kept is None else interpolants_alone(kept)
-        self._followed = None if solution.trace() is None else seen or self._followed
-        self._world, self._solution, self._paths = world, solution, PathFrames(world)
-        self._fine, self._gathers = None, None
-        if self._instant is not None:
-            self._instant.follow(world)
+        self._showing.turn(world, solution, self._settings, left)
+        self._world, self._solution = world, solution
         self._turn += 1
         self._is_behind = False
 
     def _view(self, request: FrameRequest) -> View:
-        renderer = _renderer_of(request)
-        camera = request.camera.resolve(self.scene)
-        self._frame_limits.check(camera, request.samples)
-        if renderer is RendererName.AUTO:
-            names = renderers_for(request, self._solution)
-            return AutoView(tuple((name, self._view(replace(request, renderer=name))) for name in names))
-        if renderer is RendererName.PATH:
-            if request.layer is not LayerName.RADIANCE:
-                raise NotAvailableError("layer of the path renderer", request.layer, (LayerName.RADIANCE,))
-            asked = self._paths.ask(camera, request.samples, request.max_error)
-            return PathView(asked, self._settings.error_tolerance)
-        self._drawing.require(renderer, request.layer)
-        self._drawing.require_device()
-        if renderer is RendererName.VPL:
-            return self._instant_view(camera, request)
-        if self._solution.is_sampled and renderer is RendererName.GATHER:
-            raise NotAvailableError("in a scene too large to link, the renderer", renderer, WITHOUT_LINKS)
-        fine = self._fine_light()
-        shown = RendererName.GOURAUD if renderer is RendererName.GATHER else renderer
-        solution, glance = self._solution, _MEANWHILE * camera.width * camera.height * request.samples
-        drags = self._drags and solution.state is SessionState.SOLVING and self._halted is None
-        view = SolutionView(
-            solution, self._drawing, self._seen_errors, camera, shown, request.layer, request.samples,
-            (lambda: solution.step(glance)) if drags else None,
-        )  # fmt: skip
-        if renderer is RendererName.GATHER:
-            return self._gather_view(fine, view)
-        if renderer is not RendererName.INTERPOLANT or self._solution.is_sampled:
-            return view
-        if fine is not None:
-            fine.ask(camera)
-        return InterpolantView(view, fine, self._followed)
-
-    def _fine_light(self) -> FineLight | None:
-        """Fine light, once the solution rests; a sampled one never has any."""
-        rests = self._solution.state in (SessionState.CONVERGED, SessionState.PAUSED)
-        if self._fine is None and rests and not self._solution.is_sampled:
-            before = None if self._followed is None else self._followed.interpolants
-            self._fine = FineLight(self._solution, self._drawing, self._settings, before, self._kept)
-        return self._fine
-
-    def _instant_view(self, camera: Camera, request: FrameRequest) -> InstantView:
-        if self._instant is None:
-            self._instant = InstantFrames(self._world, self._settings, self._known_light)
-        asked = self._instant.ask(camera, request.samples, request.max_error, self._drawing)
-        return InstantView(asked, self._world, request.layer, self._settings.error_tolerance)
-
-    def _known_light(self) -> Known | None:
-        """The light of the solution at points of patches, once it is corrected."""
-        fine = self._fine_light()
-        point = None if fine is None else fine.prepare()
-        return None if point is None else point.at_patches
-
-    def _gather_view(self, fine: FineLight | None, coarse: SolutionView) -> GatherView:
-        point = None if fine is None else fine.prepare()
-        if point is None:
-            return GatherView(coarse, None, fine)
-        if self._gathers is None:
-            self._gathers = GatherFrames(self._world, self._solution.field(), point, self._drawing)
-        return GatherView(coarse, self._gathers.ask(coarse.camera, coarse.samples), fine)
+        return self._showing.view(request, drags=self._drags and self._halted is None)
 
     def _outlook(self, request: FrameRequest, view: View) -> Outlook:
         return Outlook(
             tag=f"{self._life}.{self._turn}.{view.version}",
-            renderer=view.chosen[0] if isinstance(view, AutoView) else _renderer_of(request),
+            renderer=view.chosen[0] if isinstance(view, AutoView) else renderer_of(request),
             revision=self._revision,
             error_estimate=view.error_estimate,
             converged=view.converged,
@@ -517,7 +422,3 @@ def _moved_alone(step: Step) -> ObjectId | None:
 
 def _in_colour(settings: LightSettings) -> bool:
     return Saving.CHANNELS in settings.in_full
-
-
-def _renderer_of(request: FrameRequest) -> RendererName:
-    return request.renderer or BEST_RENDERER

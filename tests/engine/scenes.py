@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from solver.document.conversion import scene_of
 from solver.document.models import SceneDocument
-from solver.geometry.scene import Scene
+from solver.geometry.scene import Camera, Scene
+from tests.redistribution.rooms import crate, room
 
 
 def box_document() -> dict[str, Any]:
@@ -60,3 +64,12 @@ def box_document() -> dict[str, Any]:
 def box() -> Scene:
     """The scene of `box_document`."""
     return scene_of(SceneDocument.model_validate(box_document()))
+
+
+def furnished() -> Scene:
+    """A lit room with two crates, and a camera in its corner."""
+    camera = Camera(
+        np.array([0.3, 0.3, 2.1]), np.array([2.2, 1.8, 0.3]), np.array([0.0, 0.0, 1.0]), 70.0, 96, 72
+    )
+    scene = room((0.6, 0.5, 0.4)).with_object(crate("a", (2.6, 1.9, 0.0), 0.3))
+    return replace(scene.with_object(crate("b", (1.0, 1.2, 0.0), 0.5)), cameras={"main": camera})

@@ -100,7 +100,7 @@ def test_a_finer_tolerance_errs_less_and_takes_more(drawing: Drawing) -> None:
     for error in (0.05, 0.002):
         engine = Engine(box(), replace(LOOSE, interpolation_error=error), drawing=drawing)
         complete(engine, large)
-        fine = engine._fine
+        fine = engine._showing.fine
         assert fine is not None
         added = fine.interpolation_error(large.camera.resolve(engine.scene))
         assert added is not None and 0.0 < added <= error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,24 +10,15 @@ import pytest
 from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName
-from solver.geometry.scene import Camera, Scene
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
 from tests.engine.acting import edits
-from tests.redistribution.rooms import crate, room
+from tests.engine.scenes import furnished
 
 SETTINGS = LightSettings(error_tolerance=0.02)
 REQUEST = FrameRequest(
     CameraChoice(width=96, height=72), RendererName.INTERPOLANT, LayerName.IRRADIANCE
 )  # fmt: skip
-
-
-def furnished() -> Scene:
-    camera = Camera(
-        np.array([0.3, 0.3, 2.1]), np.array([2.2, 1.8, 0.3]), np.array([0.0, 0.0, 1.0]), 70.0, 96, 72
-    )
-    scene = room((0.6, 0.5, 0.4)).with_object(crate("a", (2.6, 1.9, 0.0), 0.3))
-    return replace(scene.with_object(crate("b", (1.0, 1.2, 0.0), 0.5)), cameras={"main": camera})
 
 
 def shown(engine: Engine) -> FloatArray:

@@ -13,12 +13,11 @@ from solver.engine.engine import Engine
 from solver.engine.followed import follow
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName
 from solver.engine.status import SessionState
-from solver.geometry.scene import Camera, Scene
 from solver.illumination.settings import LightSettings
 from solver.transport.solve import RadiositySolver
 from solver.types import LUMINANCE_WEIGHTS, FloatArray
 from tests.engine.acting import edits
-from tests.redistribution.rooms import crate, room
+from tests.engine.scenes import furnished
 
 SETTINGS = LightSettings(error_tolerance=0.03)
 FINER = LightSettings(error_tolerance=0.01)
@@ -29,14 +28,6 @@ MOVE = {"op": "move", "id": "a", "transform": {"translation": [2.5, 1.8, 0.0]}}
 PAINT = {"op": "set_material", "id": "b", "material": {"reflectance": [0.1, 0.1, 0.1]}}
 DIM = {"op": "set_material", "id": "lamp", "material": {"emission": [3.0, 3.0, 3.0]}}
 DARK = {"op": "set_material", "id": "lamp", "material": {"emission": [0.0, 0.0, 0.0]}}
-
-
-def furnished() -> Scene:
-    camera = Camera(
-        np.array([0.3, 0.3, 2.1]), np.array([2.2, 1.8, 0.3]), np.array([0.0, 0.0, 1.0]), 70.0, 96, 72
-    )
-    scene = room((0.6, 0.5, 0.4)).with_object(crate("a", (2.6, 1.9, 0.0), 0.3))
-    return replace(scene.with_object(crate("b", (1.0, 1.2, 0.0), 0.5)), cameras={"main": camera})
 
 
 def shown(engine: Engine, request: FrameRequest = FRAME) -> FloatArray:
@@ -73,7 +64,7 @@ def off(found: FloatArray, truth: FloatArray) -> float:
 
 def test_without_an_edit_they_are_what_they_were(drawing: Drawing) -> None:
     engine = looked_at(drawing)
-    fine, solution = engine._fine, engine._solution
+    fine, solution = engine._showing.fine, engine._solution
     assert fine is not None and fine.interpolants is not None
     followed = follow(fine)
     assert followed is not None and followed.interpolants is fine.interpolants

@@ -63,8 +63,8 @@ def rest(engine: Engine, request: FrameRequest = VPL) -> None:
 
 def works(engine: Engine) -> bool:
     """Whether any frame needs work."""
-    assert engine._instant is not None
-    return engine._instant.step(0.01, engine.settings.error_tolerance)
+    assert engine._showing.instant is not None
+    return engine._showing.instant.step(0.01, engine.settings.error_tolerance)
 
 
 def luminance(image: AnyArray) -> FloatArray:
@@ -232,7 +232,7 @@ def test_a_solution_may_tell_nearby_light(drawing: Drawing, monkeypatch: pytest.
     for compensation in (Compensation.RAYS, Compensation.SOLUTION):
         engine = Engine(box(), replace(QUICK, vpl_compensation=compensation), drawing=drawing)
         settle(engine)
-        while engine._known_light() is None:
+        while engine._showing.known_light() is None:
             engine.step(0.05)
         found.append(paths(engine, 1024))
     assert not np.array_equal(found[0], found[1])
@@ -294,8 +294,8 @@ def test_little_memory_costs_time_only(drawing: Drawing, monkeypatch: pytest.Mon
     monkeypatch.setattr(blocks, "SIGHT_BYTES", limit)
     engine = Engine(box(), QUICK, drawing=drawing)
     found = paths(engine, 256)
-    assert engine._instant is not None
-    assert engine._instant._blocks._bytes <= limit
+    assert engine._showing.instant is not None
+    assert engine._showing.instant._blocks._bytes <= limit
     if limit == 1:
         np.testing.assert_array_equal(found, whole)
     # Lights that are kept stand in where rays to what is near end.
