@@ -10,6 +10,7 @@ import pytest
 from solver.engine.world import World
 from solver.geometry.scene import Mesh, Scene, SceneObject
 from solver.redistribution.redistribution import Redistribution
+from solver.transport.estimate import estimate_error
 from solver.transport.field import SolveOutcome
 from solver.transport.settings import Interleaving
 from solver.transport.solve import RadiositySolver
@@ -201,3 +202,18 @@ def test_a_lamp_that_comes_shoots_first() -> None:
 
 def scene_patches(scene: Scene) -> int:
     return fresh(scene).surfaces.patch_count
+
+
+@pytest.mark.parametrize("at", [(1.0, 1.0, 0.3), (2.2, 1.4, 0.0), (3.2, 0.4, 1.2)])
+def test_the_error_told_after_an_edit_is_that_of_the_light_that_is_there(
+    at: tuple[float, float, float],
+) -> None:
+    """Though it was estimated before the last of the light had arrived: some tolerance's part of all."""
+    scene = room().with_object(crate("a", (1.0, 1.4, 0.0)))
+    solver = settled(fresh(scene))
+    for number, place in enumerate([at, (1.0, 1.4, 0.0), at], 1):
+        scene = scene.with_replaced(replace(scene.object("a"), transform=placed(place)))
+        solver = settled(edited(solver, scene, number))
+        assert solver.error_estimate == pytest.approx(
+            estimate_error(solver.state).relative, rel=2.0 * SETTINGS.error_tolerance
+        )
