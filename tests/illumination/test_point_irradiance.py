@@ -176,7 +176,8 @@ def test_light_is_that_of_rays_into_the_field() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cornell", "office", "cube_room"])
 def test_light_is_that_of_many_rays_into_the_field(name: str) -> None:
-    assert rms(field_errors(name, 1e-5, 40, 300)) < 6e-4
+    """Rays err by 5e-4 here; the gather adds 1e-4 at this accuracy, where elements are few and large."""
+    assert rms(field_errors(name, 1e-6, 40, 300)) < 6e-4
 
 
 def field_errors(name: str, accuracy: float, points: int, per_side: int) -> FloatArray:
