@@ -34,6 +34,9 @@ ALL_BEHIND: Final = -3
 _MOST: Final = 2048
 """A solid of more faces is taken for none: every face is held against the corners of all."""
 
+_MOST_WALLS: Final = 4096
+"""In a scene of more faces no walls are looked for, for the same reason."""
+
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
@@ -74,7 +77,8 @@ def find_obstacles(surfaces: Surfaces) -> Obstacles:
     )  # fmt: skip
     number = np.where(is_solid, np.cumsum(is_solid) - 1, ALONE).astype(np.int32)
     found = number[part]
-    _look_beyond(corners, counts, surfaces.normal[fronts], flat, found)
+    if n <= _MOST_WALLS:
+        _look_beyond(corners, counts, surfaces.normal[fronts], _outermost(corners), flat, found)
     solid[fronts] = found
     return Obstacles(solid, bounds[is_solid])
 
@@ -130,6 +134,12 @@ def _neighbours(start: Int64Array, end: Int64Array, patch: IntArray) -> tuple[In
 def _number_in_patch(patch: IntArray) -> Int64Array:
     """Of edges sorted by patch (e,), the number of each among those of its patch."""
     return np.arange(len(patch), dtype=np.int64) - np.searchsorted(patch, patch)
+
+
+def _outermost(corners: Corners) -> IntArray:
+    """The patches with the lowest and highest corners along the axes: where few faces have nothing beyond."""
+    heights = corners.reshape(-1, 3)
+    return np.unique(np.concatenate([heights.argmin(axis=0), heights.argmax(axis=0)]) // 4).astype(np.int32)
 
 
 @kernel
@@ -263,13 +273,21 @@ def _is_below(
 
 @kernel
 def _look_beyond(
-    corners: Corners, counts: IntArray, normals: FloatArray, tolerance: float, solid: IntArray
+    corners: Corners,
+    counts: IntArray,
+    normals: FloatArray,
+    outermost: IntArray,
+    tolerance: float,
+    solid: IntArray,
 ) -> None:
     """Mark patches that are ALONE where all corners (n, 4, 3) are on one side of them."""
     for p in range(len(counts)):
+        if solid[p] != ALONE:
+            continue
         before = True
         behind = True
-        for q in range(len(counts) if solid[p] == ALONE else 0):
+        for i in range(-len(outermost), len(counts)):
+            q = outermost[-1 - i] if i < 0 else i
             for k in range(counts[q]):
                 over = 0.0
                 for axis in range(3):
@@ -278,5 +296,5 @@ def _look_beyond(
                 behind = behind and over <= tolerance
             if not before and not behind:
                 break
-        if solid[p] == ALONE and before != behind:
+        if before != behind:
             solid[p] = ALL_BEFORE if before else ALL_BEHIND
