@@ -100,9 +100,8 @@ def headline(runs: dict[str, Run]) -> Table:
                     for part in (text_of(theirs[name]), ratio_text(theirs[name], ours))
                 ),
             )
-            rows.append(
-                Row(cells, tuple(_target(case, name, theirs[name], ours) for name in (DENOISED, RAW)))
-            )
+            measured = [name for name in (DENOISED, RAW) if chosen(trials, scene, Case.COLD, name)]
+            rows.append(Row(cells, tuple(_target(case, name, theirs[name], ours) for name in measured)))
     return Table(
         "Time to 1 % error, 640x480",
         ("scene", "clock", "by", "seconds", f"{DENOISED}: seconds", "times", f"{RAW}: seconds", "times"),
