@@ -270,7 +270,7 @@ class FineLight:
             cells = finer
 
     def _split(self, interpolants: Interpolants, cells: Cells) -> Cells:
-        if len(interpolants.triangulation.triangles) > self._settings.max_triangles:
+        if self._is_full(interpolants):
             return cells
         tolerance = self._settings.interpolation_tolerance
         chosen = np.zeros(len(cells.patch), dtype=np.bool_)
@@ -278,7 +278,12 @@ class FineLight:
             chosen |= cells_to_split(interpolants, pixels, tolerance)
         return split_cells(cells, chosen) if chosen.any() else cells
 
+    def _is_full(self, interpolants: Interpolants) -> bool:
+        return len(interpolants.triangulation.triangles) > self._settings.max_triangles
+
     def _is_urgent(self, interpolants: Interpolants) -> bool:
+        if self._is_full(interpolants):
+            return False
         tolerance = self._settings.interpolation_tolerance
         return any(has_urgent_cells(interpolants, pixels, tolerance) for pixels in self._seen.values())
 

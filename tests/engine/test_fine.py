@@ -11,6 +11,7 @@ from solver.engine.drawing import Drawing
 from solver.engine.engine import Engine
 from solver.engine.requests import CameraChoice, FrameRequest, LayerName, RendererName
 from solver.engine.status import SessionState
+from solver.illumination.interpolation import interpolants
 from solver.illumination.settings import LightSettings
 from solver.types import LUMINANCE_WEIGHTS
 from tests.engine.acting import LOOSE, edits, settle
@@ -107,6 +108,19 @@ def test_a_finer_tolerance_errs_less_and_takes_more(drawing: Drawing) -> None:
         told.append(added)
         points.append(engine.status().fine.point_irradiances)
     assert told[1] < told[0] and points[1] > 1.2 * points[0]
+
+
+def test_where_no_more_triangles_are_allowed_all_that_is_seen_is_built_all_the_same(
+    drawing: Drawing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However much of the error is in cells that would be split, before the others are built."""
+    monkeypatch.setattr(interpolants, "_BATCH", 64)
+    large = replace(FRAME, camera=CameraChoice(width=320, height=240))
+    strict = replace(LOOSE, interpolation_error=1e-4, max_triangles=1)
+    engine = complete(Engine(box(), strict, drawing=drawing), large)
+    fine = engine._showing.fine
+    assert fine is not None and fine.is_complete(large.camera.resolve(engine.scene))
+    assert engine.outlook(large).converged
 
 
 def test_an_edit_begins_anew(drawing: Drawing) -> None:
