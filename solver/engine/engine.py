@@ -31,20 +31,12 @@ from solver.engine.overlays.base import OverlayRequest, Subject, Work, is_ready
 from solver.engine.past import Past
 from solver.engine.picking import PickResult, pick_point
 from solver.engine.probing import light_at
-from solver.engine.requests import (
-    CameraChoice,
-    FrameLimits,
-    FrameRequest,
-)
+from solver.engine.requests import CameraChoice, FrameLimits, FrameRequest
 from solver.engine.savings import savings_of
 from solver.engine.showing import Showing, renderer_of
 from solver.engine.solution import Solution
 from solver.engine.status import Change, ChangeState, EngineStatus, ProbeResult, SessionState
-from solver.engine.views import (
-    Frame,
-    Outlook,
-    View,
-)
+from solver.engine.views import Frame, Outlook, View
 from solver.engine.world import World
 from solver.errors import RevisionConflictError
 from solver.geometry.scene import Scene

@@ -49,29 +49,32 @@ def irradiance(
     return np.asarray(renderer.draw(mesh, view, shading, Layer.IRRADIANCE), dtype=np.float64)
 
 
+def both(seed: int) -> tuple[InterpolantMesh, RenderMesh]:
+    """Random quadratics and a linear field over the same leaves."""
+    elements = elements_of(CORNELL, seed)
+    return interpolants(elements, random_coefficients(seed, len(elements.triangles))), elements
+
+
+def one_or_the_other(mesh: InterpolantMesh, elements: RenderMesh, shown: bool) -> tuple[BoolArray, BoolArray]:
+    """All triangles and no leaves, or, where these are `shown`, all leaves and no triangles."""
+    return np.full(len(mesh.triangles), not shown), np.full(len(elements.field.patch), shown)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_of_elements_alone_the_frame_is_that_of_elements(renderer: FrameRenderer, seed: int) -> None:
-    elements = elements_of(CORNELL, seed)
-    known = interpolants(elements, random_coefficients(seed, len(elements.triangles)))
-    none, every = (
-        np.zeros(len(known.triangles), dtype=np.bool_),
-        np.ones(len(elements.field.patch), dtype=np.bool_),
-    )
-    mesh = joined(known, none, elements, every)
-    found, expected = irradiance(renderer, mesh), irradiance(renderer, elements)
+    known, elements = both(seed)
+    triangles, leaves = one_or_the_other(known, elements, shown=True)
+    found = irradiance(renderer, joined(known, triangles, elements, leaves))
+    expected = irradiance(renderer, elements)
     assert expected.max() > 1.0
     np.testing.assert_allclose(found, expected, atol=2e-5 * expected.max())
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_of_interpolants_alone_the_frame_is_theirs(renderer: FrameRenderer, seed: int) -> None:
-    elements = elements_of(CORNELL, seed)
-    known = interpolants(elements, random_coefficients(seed, len(elements.triangles)))
-    every, none = (
-        np.ones(len(known.triangles), dtype=np.bool_),
-        np.zeros(len(elements.field.patch), dtype=np.bool_),
-    )
-    mesh = joined(known, every, elements, none)
+    known, elements = both(seed)
+    triangles, leaves = one_or_the_other(known, elements, shown=False)
+    mesh = joined(known, triangles, elements, leaves)
     np.testing.assert_array_equal(irradiance(renderer, mesh), irradiance(renderer, known))
 
 
@@ -79,8 +82,7 @@ def test_of_interpolants_alone_the_frame_is_theirs(renderer: FrameRenderer, seed
 @given(seed=st.integers(0, 1 << 20))
 def test_each_pixel_shows_what_it_would_of_one_or_the_other(renderer: FrameRenderer, seed: int) -> None:
     random = np.random.default_rng(seed)
-    elements = elements_of(CORNELL, seed)
-    known = interpolants(elements, random_coefficients(seed, len(elements.triangles)))
+    known, elements = both(seed)
     shown = random.random(len(elements.field.patch)) < 0.5
     mesh = joined(known, ~shown[elements.leaf], elements, shown)
     found = irradiance(renderer, mesh)
