@@ -52,6 +52,9 @@ _GATHER_ERROR: Final = 0.8
 """Error of point irradiance from a corrected solution over what a camera sees, relative to the estimated
 error of the solution: 0.3 in the median of many rooms, less than this in 19 of 20."""
 
+_MADE_READY: Final = 20_000
+"""Triangles: what follows an edit is not made ready of more, which would take longer than a step may"""
+
 _LAST: Final = 1e-9
 """Fewer pixels than any triangle has that is seen."""
 
@@ -264,7 +267,8 @@ class FineLight:
                         break
                 finer = self._split(interpolants, cells)
                 if finer is cells:
-                    self.following()
+                    if len(triangulation.triangles) <= _MADE_READY:
+                        self.following()
                     self._is_resting = True
                     yield
             cells = finer
